@@ -1,0 +1,225 @@
+"""The character, read from its MJCF: names, layouts, action targets, kinematics. Nothing about it is written anywhere else."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from importlib.resources import files
+from typing import Literal
+
+import mujoco
+import numpy as np
+import torch
+from torch import Tensor
+
+from murmillo.envs.errors import SuiteError
+from murmillo.envs.rotations import quat_from_rotvec, quat_mul, quat_rotate, quat_to_rotvec
+
+CONTROL_DT = 1.0 / 30.0
+"""Seconds between two actions: the papers' 30 Hz."""
+
+_KEY = "key_"  # sites of this prefix are the papers' key points
+_GROUND = "ground_"  # contact sensors of this prefix hold the ground's force on a body
+_VISUAL_GROUP = 2  # geoms that are seen but touch nothing
+
+SpecEdit = Callable[[mujoco.MjSpec], None]
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A joint and where it lies in qpos, in qvel and in the action."""
+
+    name: str
+    kind: Literal["ball", "hinge"]
+    qpos: slice
+    dof: slice
+    action: slice
+
+
+class Character:
+    """A compiled MJCF character with a free root, ball and hinge joints, and position actuators on all of them.
+
+    An action component a in [-1, 1] is mapped to the actuator's `ctrlrange`: target = offset + scale * a [rad]. A ball
+    joint's three actuators hold its exponential map (ASE section 8.1), so a target is a rotation vector.
+
+    Attributes:
+        name: file name of the MJCF without its suffix.
+        model: the model that is simulated; it has no visual geoms.
+        control_dt, substeps: seconds of a control step, and physics steps in it.
+        bodies: names of the B bodies without the world, in MJCF order.
+        joints: the joints without the root, in MJCF order, which is also the order of the actions.
+        key_bodies: names of the K key points.
+        feet: the bodies that may touch the ground.
+        action_offset, action_scale: [A] [rad], float64.
+    """
+
+    def __init__(self, name: str, spec: mujoco.MjSpec) -> None:
+        self.name = name
+        self.control_dt = CONTROL_DT
+        self._spec = spec
+        self.model = _without_visuals(spec).compile()
+        model = self.model
+        self.substeps = round(CONTROL_DT / model.opt.timestep)
+        if not np.isclose(self.substeps * model.opt.timestep, CONTROL_DT):
+            raise SuiteError(f"{name}.xml: timestep {model.opt.timestep:g} s does not divide the control step of 1/30 s")
+        _refuse_offsets(name, model)
+        self.bodies = tuple(model.body(i).name for i in range(1, model.nbody))
+        self.joints = tuple(_joints(name, model))
+        keys = [model.site(i).name for i in range(model.nsite) if model.site(i).name.startswith(_KEY)]
+        self.key_bodies = tuple(
+            sorted((key.removeprefix(_KEY) for key in keys), key=lambda body: _KEY_ORDER.index(body))
+        )
+        self.key_sites = np.array([model.site(_KEY + body).id for body in self.key_bodies])
+        self.feet = tuple(body for body in self.bodies if body.endswith("_foot"))
+        self.contact_slice = _contact_slice(name, model, self.bodies)
+        low, high = torch.from_numpy(model.actuator_ctrlrange.copy()).unbind(-1)
+        self.action_offset = 0.5 * (low + high)
+        self.action_scale = 0.5 * (high - low)
+
+    @property
+    def action_dim(self) -> int:
+        """Number of actuated degrees of freedom A."""
+        return self.model.nu
+
+    def body_ids(self, names: tuple[str, ...]) -> list[int]:
+        """Positions of these bodies in `bodies`."""
+        return [self.bodies.index(name) for name in names]
+
+    def targets(self, action: Tensor) -> Tensor:
+        """Actions [..., A] to PD targets [..., A] [rad]; actions are clamped to [-1, 1]."""
+        return self.action_offset.to(action) + self.action_scale.to(action) * action.clamp(-1.0, 1.0)
+
+    def joint_coordinates(self, qpos: Tensor) -> Tensor:
+        """What the actuators measure in the pose qpos [..., nq]: exponential maps and angles [..., A] [rad]."""
+        parts = [
+            quat_to_rotvec(qpos[..., joint.qpos]) if joint.kind == "ball" else qpos[..., joint.qpos]
+            for joint in self.joints
+        ]
+        return torch.cat(parts, dim=-1)
+
+    def action_for(self, qpos: Tensor) -> Tensor:
+        """The action [..., A] whose PD target is the pose qpos [..., nq], clamped to [-1, 1]."""
+        coordinates = self.joint_coordinates(qpos)
+        return ((coordinates - self.action_offset.to(qpos)) / self.action_scale.to(qpos)).clamp(-1.0, 1.0)
+
+    def pose(self, coordinates: Tensor, root_pos_w: Tensor, root_quat_w: Tensor) -> Tensor:
+        """The inverse of `joint_coordinates`: qpos [..., nq] with joints [..., A] [rad] and a root [..., 3] [m], [..., 4]."""
+        parts = [root_pos_w, root_quat_w]
+        for joint in self.joints:
+            value = coordinates[..., joint.action]
+            parts.append(quat_from_rotvec(value) if joint.kind == "ball" else value)
+        return torch.cat(parts, dim=-1)
+
+    @cached_property
+    def default_qpos(self) -> Tensor:
+        """The zero pose on its feet [nq], float64."""
+        return torch.from_numpy(self.model.qpos0.copy())
+
+    @cached_property
+    def _tree(self) -> list[tuple[int, Tensor, Joint | None]]:
+        """Of each body after the root: its parent in `bodies`, its offset [3] [m] there, its joint."""
+        joints = {int(self.model.joint(joint.name).bodyid[0]): joint for joint in self.joints}
+        return [
+            (
+                int(self.model.body_parentid[body]) - 1,
+                torch.from_numpy(self.model.body_pos[body].copy()),
+                joints.get(body),
+            )
+            for body in range(2, self.model.nbody)
+        ]
+
+    def forward_kinematics(self, qpos: Tensor) -> tuple[Tensor, Tensor]:
+        """Body frames in the world of the pose qpos [..., nq]: positions [..., B, 3] [m], quaternions [..., B, 4]."""
+        pos, quat = [qpos[..., 0:3]], [qpos[..., 3:7]]
+        for parent, offset, joint in self._tree:
+            pos.append(pos[parent] + quat_rotate(quat[parent], offset.to(qpos)))
+            if joint is None:
+                quat.append(quat[parent])
+            elif joint.kind == "ball":
+                quat.append(quat_mul(quat[parent], qpos[..., joint.qpos]))
+            else:
+                quat.append(quat_mul(quat[parent], _hinge_quat(self._hinge_axis[joint.name], qpos[..., joint.qpos])))
+        return torch.stack(pos, dim=-2), torch.stack(quat, dim=-2)
+
+    def key_positions(self, qpos: Tensor) -> Tensor:
+        """Key points [..., K, 3] [m] of the pose qpos [..., nq]; they lie at their bodies' origins."""
+        return self.forward_kinematics(qpos)[0][..., self.body_ids(self.key_bodies), :]
+
+    @cached_property
+    def _hinge_axis(self) -> dict[str, Tensor]:
+        axis = {}
+        for joint in self.joints:
+            if joint.kind == "hinge":
+                axis[joint.name] = torch.from_numpy(self.model.joint(joint.name).axis.copy())
+        return axis
+
+    def render_model(self, offscreen: tuple[int, int] | None = None) -> mujoco.MjModel:
+        """The model with its visual geoms, for pictures; its qpos layout is that of `model`."""
+        spec = self._spec.copy()
+        if offscreen is not None:
+            spec.visual.global_.offwidth, spec.visual.global_.offheight = offscreen
+        return spec.compile()
+
+
+_KEY_ORDER = ("right_hand", "left_hand", "right_foot", "left_foot", "sword", "shield")
+
+
+def load_character(name: str = "sword_shield", edit: SpecEdit | None = None) -> Character:
+    """Load `assets/mjcf/<name>.xml`; `edit` may change the spec (body shapes, props, terrain) before it is compiled.
+
+    Raises:
+        SuiteError: there is no such character.
+    """
+    folder = files("murmillo.assets.mjcf")
+    known = sorted(entry.name.removesuffix(".xml") for entry in folder.iterdir() if entry.name.endswith(".xml"))
+    if name not in known:
+        raise SuiteError(f"character={name}: no such character; there are: {', '.join(known)}")
+    spec = mujoco.MjSpec.from_string((folder / f"{name}.xml").read_text(encoding="utf-8"))
+    if edit is not None:
+        edit(spec)
+    return Character(name, spec)
+
+
+def _without_visuals(spec: mujoco.MjSpec) -> mujoco.MjSpec:
+    """Massless, untouchable geoms and all that serves the eye cost time in every step; training leaves them out."""
+    bare = spec.copy()
+    for geom in list(bare.geoms):
+        if geom.group == _VISUAL_GROUP:
+            bare.delete(geom)
+    return bare
+
+
+def _refuse_offsets(name: str, model: mujoco.MjModel) -> None:
+    """Kinematics here is the chain of body offsets and joint rotations; frames that need more are refused, not guessed."""
+    if not np.allclose(model.body_quat, [1.0, 0.0, 0.0, 0.0]):
+        raise SuiteError(f"{name}.xml: a body frame is rotated in its parent; rotate its geoms instead")
+    if model.jnt_pos.any() or model.site_pos.any():
+        raise SuiteError(f"{name}.xml: a joint or a key site lies off its body's origin; move the body instead")
+
+
+def _joints(name: str, model: mujoco.MjModel) -> list[Joint]:
+    """The joints after the root; refuses an MJCF whose actuators are not one a degree of freedom in joint order."""
+    widths = {int(mujoco.mjtJoint.mjJNT_BALL): ("ball", 4, 3), int(mujoco.mjtJoint.mjJNT_HINGE): ("hinge", 1, 1)}
+    joints, action = [], 0
+    for i in range(1, model.njnt):
+        joint = model.joint(i)
+        kind, nq, nv = widths[int(joint.type[0])]
+        if any(int(model.actuator_trnid[a, 0]) != i for a in range(action, action + nv)):
+            raise SuiteError(f"{name}.xml: actuators must follow the joints' order; see joint {joint.name}")
+        qpos, dof = int(joint.qposadr[0]), int(joint.dofadr[0])
+        joints.append(Joint(joint.name, kind, slice(qpos, qpos + nq), slice(dof, dof + nv), slice(action, action + nv)))
+        action += nv
+    return joints
+
+
+def _contact_slice(name: str, model: mujoco.MjModel, bodies: tuple[str, ...]) -> slice:
+    """Where sensordata holds the ground's force on each body, [B * 3]."""
+    sensors = [model.sensor(i) for i in range(model.nsensor) if model.sensor(i).name.startswith(_GROUND)]
+    if tuple(sensor.name.removeprefix(_GROUND) for sensor in sensors) != bodies:
+        raise SuiteError(f"{name}.xml: needs one contact sensor {_GROUND}<body> a body, in the bodies' order")
+    start = int(sensors[0].adr[0])
+    return slice(start, start + 3 * len(bodies))
+
+
+def _hinge_quat(axis: Tensor, angle: Tensor) -> Tensor:
+    """Quaternion [..., 4] of the angle [..., 1] about the axis [3]."""
+    return torch.cat((torch.cos(0.5 * angle), torch.sin(0.5 * angle) * axis.to(angle)), dim=-1)

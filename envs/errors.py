@@ -1,0 +1,9 @@
+"""Errors that a user can mend. Each is one line: the thing, the place, the cure; the command line prints it and exits with 2."""
+
+
+class SuiteError(ValueError):
+    """A wrong argument, file or combination given to the suite."""
+
+
+class MotionError(SuiteError):
+    """A motion file, folder or clip that cannot be used."""

@@ -1,0 +1,56 @@
+"""The state that every policy and discriminator sees; one function for the simulation and for clips."""
+
+import torch
+from torch import Tensor
+
+from murmillo.envs.character import Character
+from murmillo.envs.rotations import heading_quat, quat_conj, quat_mul, quat_rotate, tan_norm
+
+
+def state_dim(character: Character) -> int:
+    """Width of `character_state`: 120 for the sword-and-shield humanoid."""
+    rotations = sum(6 if joint.kind == "ball" else 1 for joint in character.joints)
+    return 13 + rotations + character.action_dim + 3 * len(character.key_bodies)
+
+
+def character_state(character: Character, qpos: Tensor, qvel: Tensor, key_pos_w: Tensor) -> Tensor:
+    """The papers' state in the character's heading frame (ASE section 8.1), float32.
+
+    The heading frame has its origin at the root and turns with the root's yaw alone.
+
+    | columns | what                                                    | unit    |
+    |---------|---------------------------------------------------------|---------|
+    | 1       | height of the root above the ground                     | m       |
+    | 6       | root rotation without its heading (tangent, normal)     | -       |
+    | 3       | root linear velocity                                    | m/s     |
+    | 3       | root angular velocity                                   | rad/s   |
+    | 58      | joint rotations in MJCF order: 6 a ball, 1 a hinge      | - / rad |
+    | 31      | joint velocities in the child's frame, in action order  | rad/s   |
+    | 18      | right hand, left hand, right foot, left foot, sword tip, shield | m |
+
+    Args:
+        qpos: [..., nq] MuJoCo positions: root in the world, then joints.
+        qvel: [..., nv] MuJoCo velocities: root linear in the world frame, root angular in the root's own frame, joints.
+        key_pos_w: [..., K, 3] key points in the world [m].
+
+    Returns:
+        [..., 120] for the sword-and-shield humanoid.
+    """
+    root_pos_w, root_quat_w = qpos[..., 0:3], qpos[..., 3:7]
+    to_heading = quat_conj(heading_quat(root_quat_w))
+    root_quat_h = quat_mul(to_heading, root_quat_w)
+    joints = [
+        tan_norm(qpos[..., joint.qpos]) if joint.kind == "ball" else qpos[..., joint.qpos]
+        for joint in character.joints
+    ]
+    key_pos_h = quat_rotate(to_heading.unsqueeze(-2), key_pos_w - root_pos_w.unsqueeze(-2))
+    parts = [
+        root_pos_w[..., 2:3],
+        tan_norm(root_quat_h),
+        quat_rotate(to_heading, qvel[..., 0:3]),
+        quat_rotate(root_quat_h, qvel[..., 3:6]),
+        *joints,
+        qvel[..., 6:],
+        key_pos_h.flatten(-2),
+    ]
+    return torch.cat(parts, dim=-1).float()

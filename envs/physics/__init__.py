@@ -1,0 +1,31 @@
+"""Physics engines behind one protocol."""
+
+from typing import Literal
+
+from murmillo.envs.character import Character
+from murmillo.envs.errors import SuiteError
+from murmillo.envs.physics.cpu import CpuPhysics
+from murmillo.envs.physics.interface import Physics, State
+
+__all__ = ["Physics", "State", "make_physics"]
+
+
+def make_physics(
+    character: Character, num_envs: int, *, backend: Literal["cpu"] = "cpu", threads: int = 0
+) -> Physics:
+    """N worlds of the character.
+
+    Args:
+        backend: "cpu" is MuJoCo's pool of simulations.
+        threads: CPU threads; 0 takes every CPU.
+
+    Raises:
+        SuiteError: an unknown backend, or a number of worlds or threads that cannot be.
+    """
+    if backend != "cpu":
+        raise SuiteError(f"physics={backend}: no such engine; there is: cpu")
+    if num_envs < 1:
+        raise SuiteError(f"num_envs={num_envs}: needs at least one world")
+    if threads < 0:
+        raise SuiteError(f"threads={threads}: needs a number of threads, or 0 for every CPU")
+    return CpuPhysics(character, num_envs, threads)

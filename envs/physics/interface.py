@@ -1,0 +1,70 @@
+"""What the suite asks of a physics engine: N worlds of one character, stepped together."""
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from torch import Tensor
+
+
+@dataclass(frozen=True)
+class State:
+    """Live float64 views of N worlds, current after every `step` and `write`. Read them; never write to them.
+
+    Frames: `_w` world. B bodies without the world, in MJCF order.
+
+    Attributes:
+        qpos: [N, nq] root position [m] and quaternion (wxyz), then the joints in MJCF order.
+        qvel: [N, nv] root linear velocity (world) [m/s], root angular velocity (root frame) and joints [rad/s].
+        body_pos_w: [N, B, 3] body origins [m].
+        body_quat_w: [N, B, 4] body rotations.
+        body_com_w: [N, B, 3] centres of mass [m].
+        site_pos_w: [N, S, 3] sites [m].
+        ground_force_w: [N, B, 3] force of the ground on each body in the last substep [N].
+        key_sites: [K] which of the sites are the key points.
+    """
+
+    qpos: Tensor
+    qvel: Tensor
+    body_pos_w: Tensor
+    body_quat_w: Tensor
+    body_com_w: Tensor
+    site_pos_w: Tensor
+    ground_force_w: Tensor
+    key_sites: Tensor
+
+    @property
+    def key_pos_w(self) -> Tensor:
+        """[N, K, 3] key points [m], a copy."""
+        return self.site_pos_w[:, self.key_sites]
+
+
+class Physics(Protocol):
+    """N worlds of one character."""
+
+    state: State
+    num_envs: int
+
+    def step(self, ctrl: Tensor, body_force_w: Tensor | None = None) -> None:
+        """Advance every world by one control step.
+
+        Args:
+            ctrl: [N, A] PD targets [rad].
+            body_force_w: [N, B, 3] forces at the body origins [N], held over the substeps; None applies none.
+        """
+        ...
+
+    def write(self, env_ids: Tensor, qpos: Tensor, qvel: Tensor) -> None:
+        """Put the worlds env_ids [n] into qpos [n, nq] and qvel [n, nv], at rest in every hidden state of the solver."""
+        ...
+
+    def healed(self) -> Tensor:
+        """[N] bool: worlds that the engine reset during the last step because their state had diverged."""
+        ...
+
+    def state_dict(self) -> dict[str, Any]:
+        """Everything that the next step depends on, as tensors."""
+        ...
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """Continue from `state_dict`, bit for bit."""
+        ...

@@ -1,0 +1,69 @@
+"""Pictures of one world."""
+
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from murmillo.envs.character import Character
+from murmillo.envs.errors import SuiteError
+
+
+class FrameRenderer:
+    """Off-screen frames, with the visual geoms that the simulated model leaves out."""
+
+    def __init__(self, character: Character, width: int = 640, height: int = 480, camera: str = "track") -> None:
+        """`camera` is one of the MJCF's: "track", "side" or "front"; all follow the character.
+
+        Raises:
+            SuiteError: no OpenGL context can be had, or there is no such camera.
+        """
+        self._model = character.render_model(offscreen=(width, height))
+        self._data = mujoco.MjData(self._model)
+        cameras = [self._model.camera(i).name for i in range(self._model.ncam)]
+        if camera not in cameras:
+            raise SuiteError(f"camera={camera}: no such camera; there are: {', '.join(cameras)}")
+        self._camera = camera
+        try:
+            self._renderer = mujoco.Renderer(self._model, height, width)
+        except Exception as error:
+            raise SuiteError(
+                f"rendering: no OpenGL context ({error}); install libegl1 or libosmesa6 and set MUJOCO_GL=egl or osmesa "
+                "before mujoco is imported"
+            ) from error
+
+    def frame(self, qpos: np.ndarray) -> np.ndarray:
+        """RGB frame [height, width, 3] uint8 of the pose qpos [nq]."""
+        self._data.qpos[:] = qpos
+        mujoco.mj_forward(self._model, self._data)
+        self._renderer.update_scene(self._data, self._camera)
+        return self._renderer.render()
+
+    def close(self) -> None:
+        self._renderer.close()
+
+
+class Window:
+    """A live window on a screen."""
+
+    def __init__(self, character: Character) -> None:
+        """Raises SuiteError where there is no screen."""
+        self._model = character.render_model()
+        self._data = mujoco.MjData(self._model)
+        try:
+            import mujoco.viewer
+
+            self._viewer: Any = mujoco.viewer.launch_passive(self._model, self._data)
+        except Exception as error:
+            raise SuiteError(
+                f"render_mode=human: no window can be opened ({error}); on a machine without a screen use rgb_array"
+            ) from error
+
+    def show(self, qpos: np.ndarray) -> None:
+        """Show the pose qpos [nq]."""
+        self._data.qpos[:] = qpos
+        mujoco.mj_forward(self._model, self._data)
+        self._viewer.sync()
+
+    def close(self) -> None:
+        self._viewer.close()

@@ -1,0 +1,96 @@
+"""Rotations as torch functions. Quaternions are wxyz and of unit norm, shapes are [..., 4]; leading shapes broadcast."""
+
+import torch
+from torch import Tensor
+
+
+def quat_mul(a: Tensor, b: Tensor) -> Tensor:
+    """Hamilton product [..., 4]: the rotation b followed by a."""
+    aw, ax, ay, az = a.unbind(-1)
+    bw, bx, by, bz = b.unbind(-1)
+    return torch.stack(
+        (
+            aw * bw - ax * bx - ay * by - az * bz,
+            aw * bx + ax * bw + ay * bz - az * by,
+            aw * by - ax * bz + ay * bw + az * bx,
+            aw * bz + ax * by - ay * bx + az * bw,
+        ),
+        dim=-1,
+    )
+
+
+def quat_conj(q: Tensor) -> Tensor:
+    """The inverse rotation [..., 4]."""
+    return torch.cat((q[..., :1], -q[..., 1:]), dim=-1)
+
+
+def quat_rotate(q: Tensor, v: Tensor) -> Tensor:
+    """Rotate the vectors v [..., 3] by q [..., 4]."""
+    w, xyz = q[..., :1], q[..., 1:]
+    xyz, v = torch.broadcast_tensors(xyz, v)
+    t = 2.0 * torch.linalg.cross(xyz, v)
+    return v + w * t + torch.linalg.cross(xyz, t)
+
+
+def quat_rotate_inverse(q: Tensor, v: Tensor) -> Tensor:
+    """Express the vectors v [..., 3] in the frame whose rotation is q [..., 4]."""
+    return quat_rotate(quat_conj(q), v)
+
+
+def quat_from_rotvec(v: Tensor) -> Tensor:
+    """Exponential map: rotation vector [..., 3] [rad] to quaternion [..., 4]."""
+    angle = v.norm(dim=-1, keepdim=True)
+    return torch.cat((torch.cos(0.5 * angle), 0.5 * torch.sinc(angle / (2.0 * torch.pi)) * v), dim=-1)
+
+
+def quat_to_rotvec(q: Tensor) -> Tensor:
+    """Logarithm: quaternion [..., 4] to rotation vector [..., 3], its angle in [0, pi] [rad]."""
+    q = torch.where(q[..., :1] < 0.0, -q, q)
+    sine = q[..., 1:].norm(dim=-1, keepdim=True)
+    angle = 2.0 * torch.atan2(sine, q[..., :1])
+    # near the identity angle/sine -> 2; the guard keeps the quotient finite there
+    return q[..., 1:] * torch.where(sine > 1e-8, angle / sine.clamp_min(1e-8), 2.0)
+
+
+def slerp(a: Tensor, b: Tensor, t: Tensor) -> Tensor:
+    """Interpolate a [..., 4] to b [..., 4] along the shorter arc; t [...] in [0, 1] broadcasts against the leading shape."""
+    t = t.unsqueeze(-1)
+    cosine = (a * b).sum(-1, keepdim=True)
+    b = torch.where(cosine < 0.0, -b, b)
+    angle = torch.acos(cosine.abs().clamp(max=1.0))
+    sine = torch.sin(angle)
+    small = sine < 1e-6
+    sine = torch.where(small, torch.ones_like(sine), sine)
+    weight_a = torch.where(small, 1.0 - t, torch.sin((1.0 - t) * angle) / sine)
+    weight_b = torch.where(small, t, torch.sin(t * angle) / sine)
+    q = weight_a * a + weight_b * b
+    return q / q.norm(dim=-1, keepdim=True)
+
+
+def heading(q: Tensor) -> Tensor:
+    """Yaw [...] [rad]: direction of the rotated x axis in the ground plane."""
+    w, x, y, z = q.unbind(-1)
+    return torch.atan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
+
+
+def heading_quat(q: Tensor) -> Tensor:
+    """The rotation about z [..., 4] by the heading of q."""
+    half = 0.5 * heading(q)
+    zero = torch.zeros_like(half)
+    return torch.stack((torch.cos(half), zero, zero, torch.sin(half)), dim=-1)
+
+
+def tan_norm(q: Tensor) -> Tensor:
+    """Continuous 6-D code of a rotation [..., 6]: the rotated x axis, then the rotated z axis (ASE section 8.1)."""
+    w, x, y, z = q.unbind(-1)
+    return torch.stack(
+        (
+            1.0 - 2.0 * (y * y + z * z),
+            2.0 * (x * y + w * z),
+            2.0 * (x * z - w * y),
+            2.0 * (x * z + w * y),
+            2.0 * (y * z - w * x),
+            1.0 - 2.0 * (x * x + y * y),
+        ),
+        dim=-1,
+    )

@@ -1,0 +1,112 @@
+"""How episodes begin: in a clip, in the default pose, fallen, or where the last one fell (ASE section 6.5)."""
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from murmillo.envs.character import Character
+from murmillo.envs.errors import SuiteError
+from murmillo.envs.geometry import lowest_point
+from murmillo.envs.motion import MotionLibrary
+from murmillo.envs.physics import make_physics
+
+REFERENCE, DEFAULT, FALLEN, RECOVERY = range(4)
+KINDS = ("reference", "default", "fallen", "recovery")
+
+
+@dataclass
+class StartConfig:
+    """Shares of the starts, as in the published code of ASE.
+
+    Attributes:
+        recovery: of the episodes that ended by a fall, the share that goes on from where it lies.
+        fallen: of the other episodes, the share that begins in a fallen state.
+        reference: of the rest, the share that begins in a clip; the others begin in the default pose.
+        free_steps: steps in which a recovery or fallen start may lie on the ground (60 steps are 2 s).
+        default_height: height of the pelvis in the default pose [m].
+        drop_height: fallen states are dropped from heights of this range [m] (the paper names no range).
+        fallen_states: most fallen states that are made; fewer for few worlds.
+    """
+
+    recovery: float = 0.2
+    fallen: float = 0.1
+    reference: float = 0.5
+    free_steps: int = 60
+    default_height: float = 0.89
+    drop_height: tuple[float, float] = (0.89, 1.4)
+    fallen_states: int = 256
+
+
+@dataclass(frozen=True)
+class Starts:
+    """Where n worlds begin; rows of a recovery are not used.
+
+    Attributes:
+        kind: [n] REFERENCE, DEFAULT, FALLEN or RECOVERY.
+        qpos: [n, nq]; qvel: [n, nv].
+        clip, time: [n], [n] [s] of reference starts.
+    """
+
+    kind: Tensor
+    qpos: Tensor
+    qvel: Tensor
+    clip: Tensor
+    time: Tensor
+
+
+class StartSampler:
+    """Draws starts by the shares of `StartConfig`."""
+
+    def __init__(self, character: Character, library: MotionLibrary, config: StartConfig, num_envs: int) -> None:
+        for name in ("recovery", "fallen", "reference"):
+            if not 0.0 <= getattr(config, name) <= 1.0:
+                raise SuiteError(f"starts.{name}={getattr(config, name)}: needs a share between 0 and 1")
+        self.config = config
+        self._character, self._library = character, library
+        self._pool_size = min(config.fallen_states, max(16, num_envs))
+        self._pool: Tensor | None = None
+        self._default = character.default_qpos.clone()
+        self._default[2] = config.default_height
+
+    def draw(self, fell: Tensor, generator: torch.Generator, kind: int | None = None) -> Starts:
+        """Starts of n worlds; fell [n] bool says whose last episode ended by a fall; `kind` makes all of one kind."""
+        n, config = len(fell), self.config
+        chance = torch.rand(3, n, generator=generator)
+        kinds = torch.where(chance[0] < config.reference, REFERENCE, DEFAULT)
+        kinds = torch.where(chance[1] < config.fallen, FALLEN, kinds)
+        kinds = torch.where(fell & (chance[2] < config.recovery), RECOVERY, kinds)
+        if kind is not None:
+            kinds.fill_(kind)
+        clip, time = self._library.sample(n, generator)
+        qpos, qvel = (x.double() for x in self._library.pose(clip, time))
+        # clips that sink into the floor would be thrown into the air
+        qpos[:, 2] += (-lowest_point(self._character, qpos)).clamp_min(0.0)
+        still = kinds != REFERENCE
+        qpos[still], qvel[still] = self._default, 0.0
+        fallen = (kinds == FALLEN).nonzero().squeeze(-1)
+        if len(fallen):
+            pool = self._fallen_states()
+            qpos[fallen] = pool[torch.randint(len(pool), (len(fallen),), generator=generator)]
+        return Starts(kinds, qpos, qvel, clip, time)
+
+    def _fallen_states(self) -> Tensor:
+        """[P, nq] poses of characters that were dropped 2.5 s ago in a random orientation with a random constant action.
+
+        Made once, from a generator of their own, so that they are the same in every run.
+        """
+        if self._pool is None:
+            generator, n = torch.Generator().manual_seed(0), self._pool_size
+            physics = make_physics(self._character, n)
+            qpos = self._default.repeat(n, 1)
+            low, high = self.config.drop_height
+            qpos[:, 2] = low + (high - low) * torch.rand(n, generator=generator, dtype=torch.float64)
+            orientation = torch.randn(n, 4, generator=generator, dtype=torch.float64)
+            qpos[:, 3:7] = orientation / orientation.norm(dim=-1, keepdim=True)
+            physics.write(torch.arange(n), qpos, torch.zeros_like(physics.state.qvel))
+            action = torch.rand(n, self._character.action_dim, generator=generator, dtype=torch.float64) - 0.5
+            target = self._character.targets(action)
+            for _ in range(75):
+                physics.step(target)
+            self._pool = physics.state.qpos.clone()
+        return self._pool

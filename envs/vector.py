@@ -1,0 +1,332 @@
+"""N worlds of the character in one physics batch, as a gymnasium vector environment."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Literal
+
+import gymnasium
+import numpy as np
+import torch
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from torch import Tensor
+
+from murmillo.envs.character import load_character
+from murmillo.envs.errors import SuiteError
+from murmillo.envs.falls import FallConfig, FallDetector, count_every_contact
+from murmillo.envs.motion import MotionLibrary, load_clips
+from murmillo.envs.observations import character_state, state_dim
+from murmillo.envs.physics import State, make_physics
+from murmillo.envs.rendering import FrameRenderer, Window
+from murmillo.envs.residual import ResidualForces
+from murmillo.envs.starts import FALLEN, KINDS, RECOVERY, REFERENCE, StartConfig, StartSampler
+from murmillo.envs.tasks import Imitation, Task
+
+STATE_LIMIT = 1e3
+"""Observations are cut off here; no sound simulation comes near (a diverging one may, before it is healed)."""
+
+RENDERED_WORLDS = 16
+
+
+@dataclass
+class EnvConfig:
+    """Everything that `gymnasium.make` takes beside the id.
+
+    Attributes:
+        motions: "builtin", a folder of clips or one file.
+        character: an MJCF of `assets/mjcf`.
+        window: frames of `state` that the observation `window` holds, the newest last; 1 leaves it out.
+        episode_steps: control steps until an episode is truncated (300 steps are 10 s).
+        residual_force: scale of the skeletal residual forces [N] (C.ASE section 4.2); 0 takes them out of the action.
+        autoreset: gymnasium's autoreset mode of the vector environment.
+        threads: CPU threads of the physics; 0 takes every CPU.
+        camera, width, height: of the frames of `render_mode="rgb_array"`.
+    """
+
+    motions: str = "builtin"
+    character: str = "sword_shield"
+    window: int = 1
+    episode_steps: int = 300
+    residual_force: float = 0.0
+    autoreset: Literal["same_step", "next_step", "disabled"] = "same_step"
+    threads: int = 0
+    camera: str = "track"
+    width: int = 640
+    height: int = 480
+    fall: FallConfig = field(default_factory=FallConfig)
+    starts: StartConfig = field(default_factory=StartConfig)
+
+
+class HumanoidVectorEnv(VectorEnv):
+    """N worlds of one character, stepped together.
+
+    Observations (a dict):
+        state: [N, 120] float32, the table in `murmillo.envs.observations.character_state`.
+        skill: [N] int64, the commanded label, an index into `skills`; random and independent of the start.
+        window: [N, W, 120] float32, the last W states, oldest first (only if `window` > 1). After a reference start its
+            past is the clip's own, after other starts the first state repeated.
+
+    Actions: [N, 31] in [-1, 1], PD targets at the joints (`Character.targets`); with `residual_force` > 0 [N, 76], the
+    last 45 being the residual forces at 15 joints in the heading frame, in units of that scale.
+
+    Reward: the sum of the task's terms, which `info["reward_terms"]` holds by name.
+
+    End: `terminated` by a fall (`FallConfig`) or by the task, `truncated` after `episode_steps`.
+
+    Info: `reward_terms`, `fall` [N] bool, `healed` [N] bool (a world whose simulation diverged and was reset), and in
+    SAME_STEP mode `final_obs`, the observation before any reset for all N worlds, with its mask `_final_obs` [N].
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array", "human"], "render_fps": 30}
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        config: EnvConfig | None = None,
+        task: Task | None = None,
+        render_mode: Literal["rgb_array", "human"] | None = None,
+    ) -> None:
+        """Raises SuiteError (MotionError for clips) naming the argument that cannot be."""
+        self.config = config = config or EnvConfig()
+        _check(config, render_mode, self.metadata["render_modes"])
+        self.num_envs = num_envs
+        self.render_mode = render_mode
+        self._mode = AutoresetMode[config.autoreset.upper()]
+        self.metadata = {**self.metadata, "autoreset_mode": self._mode}
+        edit = count_every_contact if config.fall.contact == "any" else None
+        self.character = load_character(config.character, edit)
+        self.library = MotionLibrary(load_clips(config.motions, self.character), self.character)
+        self.physics = make_physics(self.character, num_envs, threads=config.threads)
+        self.task = task or Imitation()
+        self._fallen = FallDetector(self.character, config.fall)
+        self._starts = StartSampler(self.character, self.library, config.starts, num_envs)
+        self._residual = ResidualForces(self.character, config.residual_force) if config.residual_force > 0 else None
+        self._set_spaces()
+        self._generator = torch.Generator()
+        self._generator.seed()
+        self._steps = torch.zeros(num_envs, dtype=torch.int64)
+        self._free_steps = torch.zeros(num_envs, dtype=torch.int64)
+        self._skill = torch.zeros(num_envs, dtype=torch.int64)
+        self._ended = torch.zeros(num_envs, dtype=torch.bool)
+        self._fell = torch.zeros(num_envs, dtype=torch.bool)
+        self._history = torch.zeros(num_envs, config.window, state_dim(self.character))
+        self._screen: FrameRenderer | Window | None = None
+
+    @property
+    def skills(self) -> tuple[str, ...]:
+        """Names of the labels that `skill` counts."""
+        return self.library.skills
+
+    @property
+    def state(self) -> State:
+        """The live physical state of all worlds."""
+        return self.physics.state
+
+    # --- gymnasium ---------------------------------------------------------------------------------------------------
+
+    def reset(
+        self, *, seed: int | Sequence[int] | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+        """Begin new episodes.
+
+        Args:
+            seed: of everything random in all worlds from here on.
+            options: `reset_mask` [N] bool resets these worlds only; `start` ("reference", "default", "fallen") makes
+                all starts of one kind.
+        """
+        if seed is not None:
+            words = np.random.SeedSequence(seed).generate_state(2)
+            self._generator.manual_seed(int(words[0]) << 31 ^ int(words[1]))
+            self._np_random, self._np_random_seed = gymnasium.utils.seeding.np_random(int(words[0]))
+            self._fell.fill_(False)
+        options = options or {}
+        start = options.get("start")
+        if start is not None and start not in KINDS[:RECOVERY]:
+            raise SuiteError(f"options['start']={start}: no such start; there are: {', '.join(KINDS[:RECOVERY])}")
+        mask = torch.as_tensor(options.get("reset_mask", np.ones(self.num_envs, dtype=bool)))
+        self._restart(mask, None if start is None else KINDS.index(start))
+        return self._observation(), {"fall": np.zeros(self.num_envs, dtype=bool)}
+
+    def step(
+        self, actions: np.ndarray | Tensor
+    ) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
+        """Advance all worlds by 1/30 s. See the class for what comes back."""
+        resetting = self._ended & (self._mode is AutoresetMode.NEXT_STEP)
+        self._advance(torch.as_tensor(actions))
+        terms = {name: term.masked_fill(resetting, 0.0) for name, term in self.task.reward(self.state).items()}
+        healed = self.physics.healed()
+        fall = self._fallen(self.state) & (self._steps > 1) & (self._free_steps == 0)
+        terminated = (fall | self.task.terminated(self.state) | healed) & ~resetting
+        truncated = (self._steps >= self.config.episode_steps) & ~terminated & ~resetting
+        self._ended, self._fell = terminated | truncated, torch.where(resetting, self._fell, fall)
+        info: dict[str, Any] = {
+            "reward_terms": {name: term.numpy() for name, term in terms.items()},
+            "fall": (fall & terminated).numpy(),
+            "healed": healed.numpy(),
+        }
+        if self._mode is AutoresetMode.SAME_STEP:
+            info["final_obs"], info["_final_obs"] = self._observation(), self._ended.numpy()
+            self._restart(self._ended)
+        else:
+            self._restart(resetting)
+        reward = torch.stack(list(terms.values())).sum(0)
+        return self._observation(), reward.numpy().astype(np.float64), terminated.numpy(), truncated.numpy(), info
+
+    def render(self) -> tuple[np.ndarray, ...] | None:
+        """Frames [height, width, 3] of the worlds, of the first 16 at most; with `render_mode="human"` shows world 0."""
+        if self.render_mode is None:
+            return None
+        if self._screen is None:
+            config = self.config
+            human = self.render_mode == "human"
+            self._screen = (
+                Window(self.character)
+                if human
+                else FrameRenderer(self.character, config.width, config.height, config.camera)
+            )
+        poses = self.state.qpos[:RENDERED_WORLDS].numpy()
+        if isinstance(self._screen, Window):
+            return self._screen.show(poses[0])
+        return tuple(self._screen.frame(pose) for pose in poses)
+
+    def close_extras(self, **kwargs: Any) -> None:
+        if self._screen is not None:
+            self._screen.close()
+            self._screen = None
+
+    # --- skills and demonstrations -----------------------------------------------------------------------------------
+
+    def set_skill(self, skill: str | int, env_ids: Sequence[int] | None = None) -> None:
+        """Command a skill from now on, until the episode's end.
+
+        Args:
+            skill: its name or its index in `skills`.
+            env_ids: the worlds; None is all.
+        """
+        if isinstance(skill, str):
+            if skill not in self.skills:
+                raise SuiteError(f"skill={skill}: no such skill; there are: {', '.join(self.skills)}")
+            skill = self.skills.index(skill)
+        if not 0 <= skill < len(self.skills):
+            raise SuiteError(f"skill={skill}: needs an index below {len(self.skills)}, or a name")
+        self._skill[slice(None) if env_ids is None else list(env_ids)] = skill
+
+    def observation(self) -> dict[str, np.ndarray]:
+        """The current observation, which a `set_skill` since the last step has changed."""
+        return self._observation()
+
+    def demonstrations(
+        self, n: int, generator: torch.Generator, skill: Tensor | None = None
+    ) -> dict[str, Tensor]:
+        """Windows of the clips, made by the function that makes the observations.
+
+        Returns:
+            window: [n, W, 120]; skill: [n] their labels; of the skills [n] asked for, or by the clips' weights.
+        """
+        clip, time = self.library.sample(n, generator, skill)
+        return {"window": self.library.window(clip, time, self.config.window), "skill": self.library.clip_skill[clip]}
+
+    def imitation_pairs(self, n: int, generator: torch.Generator) -> dict[str, Tensor]:
+        """States of the clips [n, 120], their labels `skill` [n], and the `action` [n, A] that targets the next pose."""
+        clip, time = self.library.sample(n, generator)
+        qpos_next, _ = self.library.pose(clip, time + self.character.control_dt)
+        action = torch.zeros(n, self.single_action_space.shape[0])
+        action[:, : self.character.action_dim] = self.character.action_for(qpos_next)
+        state = self.library.window(clip, time, 1)[:, 0]
+        return {"state": state, "skill": self.library.clip_skill[clip], "action": action}
+
+    # --- checkpoints -------------------------------------------------------------------------------------------------
+
+    def state_dict(self) -> dict[str, Any]:
+        """All that the next step depends on."""
+        return {"physics": self.physics.state_dict(), "generator": self._generator.get_state(), **self._clocks()}
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """Continue from `state_dict`, bit for bit."""
+        self.physics.load_state_dict(state["physics"])
+        self._generator.set_state(state["generator"])
+        for name, tensor in self._clocks().items():
+            tensor.copy_(state[name])
+
+    def _clocks(self) -> dict[str, Tensor]:
+        names = ("steps", "free_steps", "skill", "ended", "fell", "history")
+        return {name: getattr(self, f"_{name}") for name in names}
+
+    # --- inside a step -----------------------------------------------------------------------------------------------
+
+    def _set_spaces(self) -> None:
+        width = state_dim(self.character)
+        limit = {"low": -STATE_LIMIT, "high": STATE_LIMIT, "dtype": np.float32}
+        observations: dict[str, gymnasium.Space] = {
+            "state": gymnasium.spaces.Box(shape=(width,), **limit),
+            "skill": gymnasium.spaces.Discrete(len(self.skills)),
+        }
+        if self.config.window > 1:
+            observations["window"] = gymnasium.spaces.Box(shape=(self.config.window, width), **limit)
+        if self.task.goal_dim:
+            observations["goal"] = gymnasium.spaces.Box(shape=(self.task.goal_dim,), **limit)
+        residual = self._residual.action_dim if self._residual else 0
+        self.single_observation_space = gymnasium.spaces.Dict(observations)
+        self.single_action_space = gymnasium.spaces.Box(-1.0, 1.0, (self.character.action_dim + residual,), np.float32)
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+        self.action_space = batch_space(self.single_action_space, self.num_envs)
+
+    def _advance(self, action: Tensor) -> None:
+        """Physics, clocks and history of one control step."""
+        expected = (self.num_envs, self.single_action_space.shape[0])
+        if action.shape != expected:
+            raise SuiteError(f"action of shape {tuple(action.shape)}: needs {expected}")
+        action = action.double()
+        joints, extra = action.split([self.character.action_dim, expected[1] - self.character.action_dim], dim=-1)
+        force = self._residual(extra, self.state) if self._residual else None
+        self.physics.step(self.character.targets(joints), force)
+        self._steps += 1
+        self._free_steps = (self._free_steps - 1).clamp_min(0)
+        self._history = torch.cat((self._history[:, 1:], self._frame().unsqueeze(1)), dim=1)
+
+    def _frame(self) -> Tensor:
+        """[N, 120] the current state."""
+        state = self.state
+        return character_state(self.character, state.qpos, state.qvel, state.key_pos_w).clamp(-STATE_LIMIT, STATE_LIMIT)
+
+    def _restart(self, mask: Tensor, kind: int | None = None) -> None:
+        """New episodes in the worlds of mask [N] bool."""
+        ids = mask.nonzero().squeeze(-1)
+        if not len(ids):
+            return
+        starts = self._starts.draw(self._fell[ids], self._generator, kind)
+        moved = starts.kind != RECOVERY
+        self.physics.write(ids[moved], starts.qpos[moved], starts.qvel[moved])
+        history, frame = self._history.clone(), self._frame()
+        history[ids[moved]] = frame[ids[moved]].unsqueeze(1)
+        past = (starts.kind == REFERENCE).nonzero().squeeze(-1)
+        if self.config.window > 1 and len(past):
+            window = self.library.window(starts.clip[past], starts.time[past], self.config.window)
+            history[ids[past], :-1] = window[:, :-1]
+        self._history = history
+        free = (starts.kind == RECOVERY) | (starts.kind == FALLEN)
+        self._steps[ids] = 0
+        self._free_steps[ids] = torch.where(free, self.config.starts.free_steps, 0)
+        skills = torch.randint(len(self.skills), (len(ids),), generator=self._generator)
+        self._skill = self._skill.index_copy(0, ids, skills)
+        self._ended = self._ended & ~mask if self._mode is not AutoresetMode.SAME_STEP else self._ended
+        self.task.reset(ids, self.state)
+
+    def _observation(self) -> dict[str, np.ndarray]:
+        observation = {"state": self._history[:, -1].numpy(), "skill": self._skill.numpy().copy()}
+        if self.config.window > 1:
+            observation["window"] = self._history.numpy()
+        if self.task.goal_dim:
+            observation["goal"] = self.task.goal(self.state).numpy()
+        return observation
+
+
+def _check(config: EnvConfig, render_mode: str | None, modes: list[str]) -> None:
+    for name, least in (("window", 1), ("episode_steps", 1), ("residual_force", 0), ("width", 1), ("height", 1)):
+        if getattr(config, name) < least:
+            raise SuiteError(f"{name}={getattr(config, name)}: needs at least {least}")
+    for name, known in (("autoreset", ("same_step", "next_step", "disabled")),):
+        if getattr(config, name) not in known:
+            raise SuiteError(f"{name}={getattr(config, name)}: no such mode; there are: {', '.join(known)}")
+    if render_mode is not None and render_mode not in modes:
+        raise SuiteError(f"render_mode={render_mode}: no such mode; there are: {', '.join(modes)}")

@@ -1,0 +1,150 @@
+"""The character against its table, against MuJoCo's kinematics and against its own actuators."""
+
+import mujoco
+import numpy as np
+import pytest
+import torch
+
+from murmillo.envs.character import Character, load_character
+from murmillo.envs.errors import SuiteError
+from murmillo.envs.geometry import lowest_point
+
+MASSES = {  # [kg] of the published character
+    "pelvis": 9.996, "torso": 12.011, "head": 3.882, "right_upper_arm": 1.499, "right_lower_arm": 1.000,
+    "right_hand": 0.500, "sword": 0.701, "left_upper_arm": 1.499, "left_lower_arm": 1.000, "shield": 2.121,
+    "left_hand": 0.500, "right_thigh": 4.502, "right_shin": 3.000, "right_foot": 1.000, "left_thigh": 4.502,
+    "left_shin": 3.000, "left_foot": 1.000,
+}  # fmt: skip
+GAINS = {  # kp, kd, torque limit, half width of the targets [rad]
+    "abdomen": (1000, 100, 200, 1.885), "neck": (100, 10, 50, 1.257), "right_shoulder": (400, 40, 100, np.pi),
+    "right_elbow": (300, 30, 70, 1.955), "right_wrist": (100, 10, 50, 1.885), "left_shoulder": (400, 40, 100, np.pi),
+    "left_elbow": (300, 30, 70, 1.955), "right_hip": (500, 50, 200, 2.932), "right_knee": (500, 50, 150, 1.955),
+    "right_ankle": (400, 40, 90, 1.152), "left_hip": (500, 50, 200, 2.932), "left_knee": (500, 50, 150, 1.955),
+    "left_ankle": (400, 40, 90, 1.152),
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def character() -> Character:
+    return load_character()
+
+
+def random_qpos(character: Character, n: int, seed: int = 0) -> torch.Tensor:
+    """Poses with joints inside the actions' range."""
+    generator = torch.Generator().manual_seed(seed)
+    action = torch.rand(n, character.action_dim, generator=generator, dtype=torch.float64) - 0.5
+    root = torch.randn(n, 4, generator=generator, dtype=torch.float64)
+    position = torch.randn(n, 3, generator=generator, dtype=torch.float64)
+    return character.pose(character.targets(action), position, root / root.norm(dim=-1, keepdim=True))
+
+
+def test_the_table_of_bodies_and_masses(character):
+    masses = dict(zip(character.bodies, character.model.body_mass[1:], strict=True))
+    assert list(masses) == list(MASSES)
+    for body, mass in MASSES.items():
+        assert masses[body] == pytest.approx(mass, abs=1e-3), body
+    assert character.model.nv == 37
+    assert character.model.opt.timestep == pytest.approx(1 / 120)
+
+
+def test_the_table_of_gains_and_targets(character):
+    model = character.model
+    assert [joint.name for joint in character.joints] == list(GAINS)
+    for joint in character.joints:
+        kp, kd, effort, half_width = GAINS[joint.name]
+        for i in range(joint.action.start, joint.action.stop):
+            assert (model.actuator_gainprm[i, 0], -model.actuator_biasprm[i, 2]) == (kp, kd), joint.name
+            assert tuple(model.actuator_forcerange[i]) == (-effort, effort), joint.name
+            assert float(character.action_scale[i]) == pytest.approx(half_width, abs=1e-3), joint.name
+    offsets = {joint.name: character.action_offset[joint.action] for joint in character.joints}
+    assert offsets["left_elbow"].item() == pytest.approx(-1.396, abs=1e-3)
+    assert offsets["left_knee"].item() == pytest.approx(1.396, abs=1e-3)
+    assert all(not offsets[joint.name].any() for joint in character.joints if joint.kind == "ball")
+
+
+def test_soles_touch_the_ground_in_the_zero_pose(character):
+    assert lowest_point(character, character.default_qpos).item() == pytest.approx(0.0, abs=1e-4)
+
+
+def test_forward_kinematics_is_mujocos(character):
+    data = mujoco.MjData(character.model)
+    poses = random_qpos(character, 16)
+    pos, quat = character.forward_kinematics(poses)
+    for i, pose in enumerate(poses):
+        data.qpos[:] = pose.numpy()
+        mujoco.mj_forward(character.model, data)
+        np.testing.assert_allclose(pos[i], data.xpos[1:], atol=1e-12)
+        sign = np.sign((quat[i].numpy() * data.xquat[1:]).sum(-1, keepdims=True))
+        np.testing.assert_allclose(sign * quat[i].numpy(), data.xquat[1:], atol=1e-12)
+        np.testing.assert_allclose(character.joint_coordinates(pose), data.actuator_length, atol=1e-9)
+
+
+def test_lowest_point_is_where_mujoco_finds_contact(character):
+    """Lowered to a hair's breadth into the floor there is contact, raised to a hair's breadth above there is none."""
+    data = mujoco.MjData(character.model)
+    floor = character.model.geom("floor").id
+    for pose in random_qpos(character, 16, seed=1):
+        low = lowest_point(character, pose)
+        for gap, touched in ((-2e-3, True), (1e-3, False)):
+            data.qpos[:] = pose.numpy()
+            data.qpos[2] += gap - low.item()
+            mujoco.mj_forward(character.model, data)
+            pairs = [data.contact.geom[i] for i in range(data.ncon) if data.contact.dist[i] < 0]
+            assert any(floor in pair for pair in pairs) is touched
+
+
+def test_action_for_inverts_targets(character):
+    poses = random_qpos(character, 8)
+    action = character.action_for(poses)
+    torch.testing.assert_close(character.targets(action), character.joint_coordinates(poses))
+    assert torch.equal(character.targets(torch.full((31,), 7.0)), character.targets(torch.ones(31)))
+
+
+def test_actuators_reach_an_exponential_map_target(character):
+    """Without gravity and ground, a joint's rotation settles at the rotation vector that was its target."""
+
+    def weightless(spec: mujoco.MjSpec) -> None:
+        spec.option.gravity = [0, 0, 0]
+        for geom in spec.geoms:
+            geom.contype = geom.conaffinity = 0
+
+    character = load_character(edit=weightless)
+    data = mujoco.MjData(character.model)
+    targets = torch.zeros(31, dtype=torch.float64)
+    wanted = {"abdomen": [0.3, -0.4, 0.2], "left_shoulder": [1.2, -0.7, 0.4], "right_hip": [-0.4, -1.1, 0.3]}
+    for joint in character.joints:
+        if joint.name in wanted:
+            targets[joint.action] = torch.tensor(wanted[joint.name], dtype=torch.float64)
+        elif joint.kind == "hinge":
+            targets[joint.action] = character.action_offset[joint.action]
+    data.ctrl[:] = targets.numpy()
+    for _ in range(600):
+        mujoco.mj_step(character.model, data)
+    reached = torch.from_numpy(data.qpos.copy())
+    expected = character.pose(targets, reached[:3], reached[3:7])
+    for joint in character.joints:
+        alignment = (reached[joint.qpos] * expected[joint.qpos]).sum().abs() if joint.kind == "ball" else None
+        if alignment is None:
+            assert reached[joint.qpos].item() == pytest.approx(expected[joint.qpos].item(), abs=1e-3), joint.name
+        else:
+            assert 2 * torch.acos(alignment.clamp(max=1)) < 2e-3, joint.name
+
+
+def test_visual_geoms_are_left_out_of_the_physics_but_not_of_the_picture(character):
+    full = character.render_model()
+    assert full.ngeom > 2 * character.model.ngeom
+    np.testing.assert_allclose(full.body_mass, character.model.body_mass)
+    assert full.nq == character.model.nq
+
+
+def test_an_unknown_character_is_refused_by_name():
+    with pytest.raises(SuiteError, match="character=sword_shiled: .* sword_shield"):
+        load_character("sword_shiled")
+
+
+def test_a_model_that_breaks_a_convention_is_refused():
+    def rotate(spec: mujoco.MjSpec) -> None:
+        spec.body("head").quat = [0.7, 0.7, 0, 0]
+
+    with pytest.raises(SuiteError, match="rotated in its parent"):
+        load_character(edit=rotate)
