@@ -79,16 +79,22 @@ class StartSampler:
         if kind is not None:
             kinds.fill_(kind)
         clip, time = self._library.sample(n, generator)
-        qpos, qvel = (x.double() for x in self._library.pose(clip, time))
-        # clips that sink into the floor would be thrown into the air
-        qpos[:, 2] += (-lowest_point(self._character, qpos)).clamp_min(0.0)
-        still = kinds != REFERENCE
-        qpos[still], qvel[still] = self._default, 0.0
+        qpos = self._default.repeat(n, 1)
+        qvel = torch.zeros(n, self._character.model.nv, dtype=torch.float64)
+        moving = (kinds == REFERENCE).nonzero().squeeze(-1)
+        if len(moving):
+            qpos[moving], qvel[moving] = self._reference(clip[moving], time[moving])
         fallen = (kinds == FALLEN).nonzero().squeeze(-1)
         if len(fallen):
             pool = self._fallen_states()
             qpos[fallen] = pool[torch.randint(len(pool), (len(fallen),), generator=generator)]
         return Starts(kinds, qpos, qvel, clip, time)
+
+    def _reference(self, clip: Tensor, time: Tensor) -> tuple[Tensor, Tensor]:
+        """Poses and velocities of the clips, lifted out of the floor: what sinks into it would be thrown into the air."""
+        qpos, qvel = self._library.pose(clip, time)
+        qpos[:, 2] += (-lowest_point(self._character, qpos)).clamp_min(0.0)
+        return qpos.double(), qvel.double()
 
     def _fallen_states(self) -> Tensor:
         """[P, nq] poses of characters that were dropped 2.5 s ago in a random orientation with a random constant action.
