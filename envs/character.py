@@ -1,4 +1,4 @@
-"""The character, read from its MJCF: names, layouts, action targets, kinematics. Nothing about it is written anywhere else."""
+"""The character as its MJCF has it: names, layouts, action targets, kinematics. Nothing of it is written elsewhere."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -35,6 +35,15 @@ class Joint:
     action: slice
 
 
+@dataclass(frozen=True)
+class _Level:
+    """Bodies at one depth of the tree, their parents, and their offsets [n, 3] [m] there."""
+
+    bodies: list[int]
+    parents: list[int]
+    offsets: Tensor
+
+
 class Character:
     """A compiled MJCF character with a free root, ball and hinge joints, and position actuators on all of them.
 
@@ -60,7 +69,7 @@ class Character:
         model = self.model
         self.substeps = round(CONTROL_DT / model.opt.timestep)
         if not np.isclose(self.substeps * model.opt.timestep, CONTROL_DT):
-            raise SuiteError(f"{name}.xml: timestep {model.opt.timestep:g} s does not divide the control step of 1/30 s")
+            raise SuiteError(f"{name}.xml: timestep {model.opt.timestep:g} s does not divide a control step of 1/30 s")
         _refuse_offsets(name, model)
         self.bodies = tuple(model.body(i).name for i in range(1, model.nbody))
         self.joints = tuple(_joints(name, model))
@@ -102,7 +111,7 @@ class Character:
         return ((coordinates - self.action_offset.to(qpos)) / self.action_scale.to(qpos)).clamp(-1.0, 1.0)
 
     def pose(self, coordinates: Tensor, root_pos_w: Tensor, root_quat_w: Tensor) -> Tensor:
-        """The inverse of `joint_coordinates`: qpos [..., nq] with joints [..., A] [rad] and a root [..., 3] [m], [..., 4]."""
+        """Inverse of `joint_coordinates`: qpos [..., nq] of joints [..., A] [rad] and a root [..., 3] [m], [..., 4]."""
         parts = [root_pos_w, root_quat_w]
         for joint in self.joints:
             value = coordinates[..., joint.action]
@@ -114,43 +123,62 @@ class Character:
         """The zero pose on its feet [nq], float64."""
         return torch.from_numpy(self.model.qpos0.copy())
 
-    @cached_property
-    def _tree(self) -> list[tuple[int, Tensor, Joint | None]]:
-        """Of each body after the root: its parent in `bodies`, its offset [3] [m] there, its joint."""
-        joints = {int(self.model.joint(joint.name).bodyid[0]): joint for joint in self.joints}
-        return [
-            (
-                int(self.model.body_parentid[body]) - 1,
-                torch.from_numpy(self.model.body_pos[body].copy()),
-                joints.get(body),
-            )
-            for body in range(2, self.model.nbody)
-        ]
-
     def forward_kinematics(self, qpos: Tensor) -> tuple[Tensor, Tensor]:
         """Body frames in the world of the pose qpos [..., nq]: positions [..., B, 3] [m], quaternions [..., B, 4]."""
-        pos, quat = [qpos[..., 0:3]], [qpos[..., 3:7]]
-        for parent, offset, joint in self._tree:
-            pos.append(pos[parent] + quat_rotate(quat[parent], offset.to(qpos)))
-            if joint is None:
-                quat.append(quat[parent])
-            elif joint.kind == "ball":
-                quat.append(quat_mul(quat[parent], qpos[..., joint.qpos]))
-            else:
-                quat.append(quat_mul(quat[parent], _hinge_quat(self._hinge_axis[joint.name], qpos[..., joint.qpos])))
-        return torch.stack(pos, dim=-2), torch.stack(quat, dim=-2)
+        pos = qpos.new_empty(*qpos.shape[:-1], len(self.bodies), 3)
+        quat = self._local_rotations(qpos)
+        pos[..., 0, :] = qpos[..., 0:3]
+        for level in self._levels:
+            parent = quat[..., level.parents, :]
+            pos[..., level.bodies, :] = pos[..., level.parents, :] + quat_rotate(parent, level.offsets.to(qpos))
+            quat[..., level.bodies, :] = quat_mul(parent, quat[..., level.bodies, :])
+        return pos, quat
+
+    def _local_rotations(self, qpos: Tensor) -> Tensor:
+        """Rotation of each body in its parent [..., B, 4]; the root's is in the world."""
+        quat = qpos.new_zeros(*qpos.shape[:-1], len(self.bodies), 4)
+        quat[..., 0] = 1.0
+        quat[..., 0, :] = qpos[..., 3:7]
+        bodies, columns = self._balls
+        quat[..., bodies, :] = qpos[..., columns]
+        bodies, columns, axes = self._hinges
+        half = 0.5 * qpos[..., columns]
+        quat[..., bodies, 0] = half.cos()
+        quat[..., bodies, 1:] = half.sin().unsqueeze(-1) * axes.to(qpos)
+        return quat
+
+    @cached_property
+    def _levels(self) -> list["_Level"]:
+        """The bodies after the root by their depth in the tree: those of a level are moved together."""
+        parents = self.model.body_parentid[1:] - 1
+        offsets = torch.from_numpy(self.model.body_pos[1:].copy())
+        levels, placed = [], [0]
+        while len(placed) < len(parents):
+            bodies = [body for body in range(1, len(parents)) if body not in placed and parents[body] in placed]
+            levels.append(_Level(bodies, parents[bodies].tolist(), offsets[bodies]))
+            placed += bodies
+        return levels
+
+    @cached_property
+    def _balls(self) -> tuple[list[int], Tensor]:
+        """Bodies on ball joints, and the columns [n, 4] of their quaternions in qpos."""
+        joints = [joint for joint in self.joints if joint.kind == "ball"]
+        return [self._child(joint) for joint in joints], torch.stack([_columns(joint.qpos) for joint in joints])
+
+    @cached_property
+    def _hinges(self) -> tuple[list[int], list[int], Tensor]:
+        """Bodies on hinges, the columns [n] of their angles in qpos, and the axes [n, 3]."""
+        joints = [joint for joint in self.joints if joint.kind == "hinge"]
+        axes = torch.stack([torch.from_numpy(self.model.joint(joint.name).axis.copy()) for joint in joints])
+        return [self._child(joint) for joint in joints], [joint.qpos.start for joint in joints], axes
+
+    def _child(self, joint: Joint) -> int:
+        """Position in `bodies` of the body that the joint moves."""
+        return int(self.model.joint(joint.name).bodyid[0]) - 1
 
     def key_positions(self, qpos: Tensor) -> Tensor:
         """Key points [..., K, 3] [m] of the pose qpos [..., nq]; they lie at their bodies' origins."""
         return self.forward_kinematics(qpos)[0][..., self.body_ids(self.key_bodies), :]
-
-    @cached_property
-    def _hinge_axis(self) -> dict[str, Tensor]:
-        axis = {}
-        for joint in self.joints:
-            if joint.kind == "hinge":
-                axis[joint.name] = torch.from_numpy(self.model.joint(joint.name).axis.copy())
-        return axis
 
     def render_model(self, offscreen: tuple[int, int] | None = None) -> mujoco.MjModel:
         """The model with its visual geoms, for pictures; its qpos layout is that of `model`."""
@@ -189,7 +217,7 @@ def _without_visuals(spec: mujoco.MjSpec) -> mujoco.MjSpec:
 
 
 def _refuse_offsets(name: str, model: mujoco.MjModel) -> None:
-    """Kinematics here is the chain of body offsets and joint rotations; frames that need more are refused, not guessed."""
+    """Kinematics here is a chain of body offsets and joint rotations; frames that need more are refused."""
     if not np.allclose(model.body_quat, [1.0, 0.0, 0.0, 0.0]):
         raise SuiteError(f"{name}.xml: a body frame is rotated in its parent; rotate its geoms instead")
     if model.jnt_pos.any() or model.site_pos.any():
@@ -198,7 +226,10 @@ def _refuse_offsets(name: str, model: mujoco.MjModel) -> None:
 
 def _joints(name: str, model: mujoco.MjModel) -> list[Joint]:
     """The joints after the root; refuses an MJCF whose actuators are not one a degree of freedom in joint order."""
-    widths = {int(mujoco.mjtJoint.mjJNT_BALL): ("ball", 4, 3), int(mujoco.mjtJoint.mjJNT_HINGE): ("hinge", 1, 1)}
+    widths: dict[int, tuple[Literal["ball", "hinge"], int, int]] = {
+        int(mujoco.mjtJoint.mjJNT_BALL): ("ball", 4, 3),
+        int(mujoco.mjtJoint.mjJNT_HINGE): ("hinge", 1, 1),
+    }
     joints, action = [], 0
     for i in range(1, model.njnt):
         joint = model.joint(i)
@@ -220,6 +251,5 @@ def _contact_slice(name: str, model: mujoco.MjModel, bodies: tuple[str, ...]) ->
     return slice(start, start + 3 * len(bodies))
 
 
-def _hinge_quat(axis: Tensor, angle: Tensor) -> Tensor:
-    """Quaternion [..., 4] of the angle [..., 1] about the axis [3]."""
-    return torch.cat((torch.cos(0.5 * angle), torch.sin(0.5 * angle) * axis.to(angle)), dim=-1)
+def _columns(where: slice) -> Tensor:
+    return torch.arange(where.start, where.stop)

@@ -1,4 +1,4 @@
-"""Errors that a user can mend. Each is one line: the thing, the place, the cure; the command line prints it and exits with 2."""
+"""Errors that a user can mend. Each is one line: the thing, the place, the cure; commands print it and exit with 2."""
 
 
 class SuiteError(ValueError):

@@ -17,8 +17,8 @@ class FallConfig:
     """A fall: a body other than the feet is touched, and a body other than the feet is low (published code of ASE).
 
     Attributes:
-        contact: "ground" counts the ground's touch only (the paper's words); "any" counts touches of the character's own
-            bodies too, as the published code's net contact forces do.
+        contact: "ground" counts the ground's touch only (the paper's words); "any" counts touches of the character's
+            own bodies too, as the published code's net contact forces do.
         force: least force that is a touch, per axis [N].
         height: a body whose origin is below is low [m].
         heights: exceptions to `height` by body [m]; the left forearm's allows for the shield.

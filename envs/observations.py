@@ -40,8 +40,7 @@ def character_state(character: Character, qpos: Tensor, qvel: Tensor, key_pos_w:
     to_heading = quat_conj(heading_quat(root_quat_w))
     root_quat_h = quat_mul(to_heading, root_quat_w)
     joints = [
-        tan_norm(qpos[..., joint.qpos]) if joint.kind == "ball" else qpos[..., joint.qpos]
-        for joint in character.joints
+        tan_norm(qpos[..., joint.qpos]) if joint.kind == "ball" else qpos[..., joint.qpos] for joint in character.joints
     ]
     key_pos_h = quat_rotate(to_heading.unsqueeze(-2), key_pos_w - root_pos_w.unsqueeze(-2))
     parts = [

@@ -28,8 +28,8 @@ class FrameRenderer:
             self._renderer = mujoco.Renderer(self._model, height, width)
         except Exception as error:
             raise SuiteError(
-                f"rendering: no OpenGL context ({error}); install libegl1 or libosmesa6 and set MUJOCO_GL=egl or osmesa "
-                "before mujoco is imported"
+                f"rendering: no OpenGL context ({error}); install libegl1 or libosmesa6 and set MUJOCO_GL=egl or "
+                "osmesa before mujoco is imported"
             ) from error
 
     def frame(self, qpos: np.ndarray) -> np.ndarray:
@@ -51,9 +51,9 @@ class Window:
         self._model = character.render_model()
         self._data = mujoco.MjData(self._model)
         try:
-            import mujoco.viewer
+            from mujoco import viewer  # needs a screen's libraries
 
-            self._viewer: Any = mujoco.viewer.launch_passive(self._model, self._data)
+            self._viewer: Any = viewer.launch_passive(self._model, self._data)
         except Exception as error:
             raise SuiteError(
                 f"render_mode=human: no window can be opened ({error}); on a machine without a screen use rgb_array"

@@ -1,4 +1,4 @@
-"""Rotations as torch functions. Quaternions are wxyz and of unit norm, shapes are [..., 4]; leading shapes broadcast."""
+"""Rotations as torch functions. Quaternions [..., 4] are wxyz and of unit norm; leading shapes broadcast."""
 
 import torch
 from torch import Tensor
@@ -53,7 +53,7 @@ def quat_to_rotvec(q: Tensor) -> Tensor:
 
 
 def slerp(a: Tensor, b: Tensor, t: Tensor) -> Tensor:
-    """Interpolate a [..., 4] to b [..., 4] along the shorter arc; t [...] in [0, 1] broadcasts against the leading shape."""
+    """Interpolate a [..., 4] to b [..., 4] along the shorter arc; t [...] in [0, 1] broadcasts."""
     t = t.unsqueeze(-1)
     cosine = (a * b).sum(-1, keepdim=True)
     b = torch.where(cosine < 0.0, -b, b)

@@ -91,13 +91,13 @@ class StartSampler:
         return Starts(kinds, qpos, qvel, clip, time)
 
     def _reference(self, clip: Tensor, time: Tensor) -> tuple[Tensor, Tensor]:
-        """Poses and velocities of the clips, lifted out of the floor: what sinks into it would be thrown into the air."""
+        """Poses and velocities of the clips, lifted out of the floor, which would throw them into the air."""
         qpos, qvel = self._library.pose(clip, time)
         qpos[:, 2] += (-lowest_point(self._character, qpos)).clamp_min(0.0)
         return qpos.double(), qvel.double()
 
     def _fallen_states(self) -> Tensor:
-        """[P, nq] poses of characters that were dropped 2.5 s ago in a random orientation with a random constant action.
+        """[P, nq] poses of characters that were dropped 2.5 s ago, turned at random, with a random constant action.
 
         Made once, from a generator of their own, so that they are the same in every run.
         """

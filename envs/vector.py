@@ -2,11 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar, Literal
+from typing import Any, Literal
 
 import gymnasium
 import numpy as np
 import torch
+from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from torch import Tensor
@@ -77,7 +78,7 @@ class HumanoidVectorEnv(VectorEnv):
     SAME_STEP mode `final_obs`, the observation before any reset for all N worlds, with its mask `_final_obs` [N].
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array", "human"], "render_fps": 30}
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array", "human"], "render_fps": 30}  # noqa: RUF012 gymnasium's own type
 
     def __init__(
         self,
@@ -92,7 +93,7 @@ class HumanoidVectorEnv(VectorEnv):
         self.num_envs = num_envs
         self.render_mode = render_mode
         self._mode = AutoresetMode[config.autoreset.upper()]
-        self.metadata = {**self.metadata, "autoreset_mode": self._mode}
+        self.metadata = {**type(self).metadata, "autoreset_mode": self._mode}
         edit = count_every_contact if config.fall.contact == "any" else None
         self.character = load_character(config.character, edit)
         self.library = MotionLibrary(load_clips(config.motions, self.character), self.character)
@@ -137,7 +138,7 @@ class HumanoidVectorEnv(VectorEnv):
         if seed is not None:
             words = np.random.SeedSequence(seed).generate_state(2)
             self._generator.manual_seed(int(words[0]) << 31 ^ int(words[1]))
-            self._np_random, self._np_random_seed = gymnasium.utils.seeding.np_random(int(words[0]))
+            self._np_random, self._np_random_seed = seeding.np_random(int(words[0]))
             self._fell.fill_(False)
         options = options or {}
         start = options.get("start")
@@ -173,7 +174,7 @@ class HumanoidVectorEnv(VectorEnv):
         return self._observation(), reward.numpy().astype(np.float64), terminated.numpy(), truncated.numpy(), info
 
     def render(self) -> tuple[np.ndarray, ...] | None:
-        """Frames [height, width, 3] of the worlds, of the first 16 at most; with `render_mode="human"` shows world 0."""
+        """Frames [height, width, 3] of the worlds, of the first 16 at most; `render_mode="human"` shows world 0."""
         if self.render_mode is None:
             return None
         if self._screen is None:
@@ -215,9 +216,7 @@ class HumanoidVectorEnv(VectorEnv):
         """The current observation, which a `set_skill` since the last step has changed."""
         return self._observation()
 
-    def demonstrations(
-        self, n: int, generator: torch.Generator, skill: Tensor | None = None
-    ) -> dict[str, Tensor]:
+    def demonstrations(self, n: int, generator: torch.Generator, skill: Tensor | None = None) -> dict[str, Tensor]:
         """Windows of the clips, made by the function that makes the observations.
 
         Returns:
@@ -227,10 +226,10 @@ class HumanoidVectorEnv(VectorEnv):
         return {"window": self.library.window(clip, time, self.config.window), "skill": self.library.clip_skill[clip]}
 
     def imitation_pairs(self, n: int, generator: torch.Generator) -> dict[str, Tensor]:
-        """States of the clips [n, 120], their labels `skill` [n], and the `action` [n, A] that targets the next pose."""
+        """`state` [n, 120] of the clips, their `skill` [n], and the `action` [n, A] that targets the next pose."""
         clip, time = self.library.sample(n, generator)
         qpos_next, _ = self.library.pose(clip, time + self.character.control_dt)
-        action = torch.zeros(n, self.single_action_space.shape[0])
+        action = torch.zeros(n, self._action_dim)
         action[:, : self.character.action_dim] = self.character.action_for(qpos_next)
         state = self.library.window(clip, time, 1)[:, 0]
         return {"state": state, "skill": self.library.clip_skill[clip], "action": action}
@@ -265,15 +264,15 @@ class HumanoidVectorEnv(VectorEnv):
             observations["window"] = gymnasium.spaces.Box(shape=(self.config.window, width), **limit)
         if self.task.goal_dim:
             observations["goal"] = gymnasium.spaces.Box(shape=(self.task.goal_dim,), **limit)
-        residual = self._residual.action_dim if self._residual else 0
+        self._action_dim = self.character.action_dim + (self._residual.action_dim if self._residual else 0)
         self.single_observation_space = gymnasium.spaces.Dict(observations)
-        self.single_action_space = gymnasium.spaces.Box(-1.0, 1.0, (self.character.action_dim + residual,), np.float32)
+        self.single_action_space = gymnasium.spaces.Box(-1.0, 1.0, (self._action_dim,), np.float32)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
 
     def _advance(self, action: Tensor) -> None:
         """Physics, clocks and history of one control step."""
-        expected = (self.num_envs, self.single_action_space.shape[0])
+        expected = (self.num_envs, self._action_dim)
         if action.shape != expected:
             raise SuiteError(f"action of shape {tuple(action.shape)}: needs {expected}")
         action = action.double()

@@ -10,9 +10,7 @@ from murmillo.envs.physics.interface import Physics, State
 __all__ = ["Physics", "State", "make_physics"]
 
 
-def make_physics(
-    character: Character, num_envs: int, *, backend: Literal["cpu"] = "cpu", threads: int = 0
-) -> Physics:
+def make_physics(character: Character, num_envs: int, *, backend: Literal["cpu"] = "cpu", threads: int = 0) -> Physics:
     """N worlds of the character.
 
     Args:

@@ -54,7 +54,7 @@ class Physics(Protocol):
         ...
 
     def write(self, env_ids: Tensor, qpos: Tensor, qvel: Tensor) -> None:
-        """Put the worlds env_ids [n] into qpos [n, nq] and qvel [n, nv], at rest in every hidden state of the solver."""
+        """Put the worlds env_ids [n] into qpos [n, nq] and qvel [n, nv], and forget all that the solver kept."""
         ...
 
     def healed(self) -> Tensor:

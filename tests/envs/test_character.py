@@ -138,7 +138,7 @@ def test_visual_geoms_are_left_out_of_the_physics_but_not_of_the_picture(charact
 
 
 def test_an_unknown_character_is_refused_by_name():
-    with pytest.raises(SuiteError, match="character=sword_shiled: .* sword_shield"):
+    with pytest.raises(SuiteError, match=r"character=sword_shiled: .* sword_shield"):
         load_character("sword_shiled")
 
 

@@ -71,8 +71,8 @@ def test_what_was_returned_is_not_overwritten_by_later_steps():
     env = make(4, window=3)
     kept, _ = env.reset(seed=0)
     copy = {name: array.copy() for name, array in kept.items()}
-    for step in range(30):
-        _, _, _, _, info = env.step(limp(env))
+    for _ in range(30):
+        env.step(limp(env))
     env.set_skill(0)
     for name in copy:
         assert np.array_equal(kept[name], copy[name]), name
@@ -126,7 +126,7 @@ def test_next_step_returns_the_last_observation_then_resets_and_ignores_that_act
     env.reset(seed=0)
     flags = []
     for _ in range(8):
-        obs, reward, terminated, truncated, info = env.step(noise(env, 1))
+        obs, _, terminated, truncated, info = env.step(noise(env, 1))
         flags.append(bool(truncated[0]))
         assert "final_obs" not in info
         if flags[-2:-1] == [True]:  # the step after an end is the reset

@@ -1,0 +1,55 @@
+"""Prints the figures of a run side by side, as ratios to bare mj_step."""
+
+import json
+import os
+import platform
+from importlib.metadata import version
+from pathlib import Path
+
+import pytest
+
+RESULTS: list[tuple[str, float, str]] = []
+"""What was measured: a name, control steps (or samples) a second, a note."""
+
+BARE = "bare mj_step, all cores"
+
+
+@pytest.fixture
+def record(benchmark):
+    """`record(name, units, note)` after `benchmark(...)`: `units` control steps were done in each round."""
+
+    def keep(name: str, units: int, note: str = "") -> float:
+        rate = units / benchmark.stats.stats.median
+        benchmark.extra_info["per_second"] = rate
+        RESULTS.append((name, rate, note))
+        return rate
+
+    return keep
+
+
+def pytest_terminal_summary(terminalreporter) -> None:
+    if not RESULTS:
+        return
+    table = markdown(RESULTS)
+    terminalreporter.section("control steps a second")
+    terminalreporter.write_line(table)
+    folder = Path(os.environ.get("MURMILLO_BENCH", "benchmarks/results"))
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "throughput.md").write_text(table + "\n", encoding="utf-8")
+    (folder / "throughput.json").write_text(json.dumps(RESULTS, indent=1) + "\n", encoding="utf-8")
+
+
+def markdown(results: list[tuple[str, float, str]]) -> str:
+    """The results as a table, with the machine and the versions."""
+    bare = next((rate for name, rate, _ in results if name == BARE), None)
+    packages = ", ".join(f"{name} {version(name)}" for name in ("mujoco", "torch", "gymnasium", "numpy"))
+    lines = [
+        f"{platform.machine()}, {os.cpu_count()} CPUs, Python {platform.python_version()}, {packages}",
+        "",
+        "| what | a second | of bare `mj_step` | note |",
+        "|---|---:|---:|---|",
+    ]
+    for name, rate, note in results:
+        ratio = f"{rate / bare:.2f}" if bare and not name.startswith("training") else ""
+        lines.append(f"| {name} | {rate:,.0f} | {ratio} | {note} |")
+    return "\n".join(lines)
