@@ -1,0 +1,113 @@
+"""Loading clips, whatever they are stored as, and saving them."""
+
+import os
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from murmillo.envs.character import Character
+from murmillo.envs.errors import MotionError
+from murmillo.envs.motion.clip import Clip
+from murmillo.envs.motion.manifest import MANIFEST
+from murmillo.envs.motion.native import read_clips, save_clips
+from murmillo.envs.motion.poselib import read_poselib
+from murmillo.envs.motion.reading import read_bytes
+
+__all__ = ["BUILTIN", "load_clips", "save_clips"]
+
+BUILTIN = "builtin"
+_YAML = (".yaml", ".yml")
+_DATASET = "motions: [{file: NAME.npy, weight: 1.0}]"
+
+
+def load_clips(path: str | Path, character: Character) -> list[Clip]:
+    """Clips for the character, checked: finite, of its layout, with unit quaternions continuous in sign.
+
+    Args:
+        path: one of
+            - "builtin", the clips that come with murmillo;
+            - a folder with manifest.json, written by `save_clips`;
+            - a folder with poselib .npy files: those that its dataset yaml lists, with their weights, or all of them
+              where there is no yaml;
+            - a dataset yaml (`motions: [{file, weight}]`) beside poselib files;
+            - one poselib .npy, or one .npz of a folder with manifest.json.
+
+    Raises:
+        MotionError: nothing there, or a file that is damaged, belongs to another character or asks for code to be run.
+    """
+    if str(path) == BUILTIN:
+        return _load_builtin(character)
+    path = Path(path)
+    if not os.path.exists(path):  # Path.exists raises for a name that no file can have
+        raise MotionError(f"motions={path}: there is no such file or folder; give the path of clips, or {BUILTIN}")
+    if path.is_dir():
+        return _load_folder(path, character)
+    suffix = path.suffix.lower()
+    if suffix == ".npy":
+        return _load_poselib({path: 1.0}, character)
+    if suffix == ".npz":
+        return read_clips(path.parent, character, only=path.name)
+    if suffix in _YAML:
+        return _load_poselib(_read_dataset(path), character)
+    raise MotionError(f"motions={path}: files of type {suffix or '(none)'} are unknown; known are .npy, .npz and .yaml")
+
+
+def _load_builtin(character: Character) -> list[Clip]:
+    packs = Path(str(resources.files("murmillo.assets.motions")))
+    if not (packs / character.name / MANIFEST).is_file():
+        known = ", ".join(sorted(file.parent.name for file in packs.glob(f"*/{MANIFEST}"))) or "no character"
+        raise MotionError(f"motions={BUILTIN}: has clips for {known}, not for {character.name}; give the path of clips")
+    return read_clips(packs / character.name, character)
+
+
+def _load_folder(folder: Path, character: Character) -> list[Clip]:
+    files = sorted(folder.iterdir())
+    if folder / MANIFEST in files:
+        return read_clips(folder, character)
+    clips = {file: 1.0 for file in files if file.suffix.lower() == ".npy"}
+    if not clips:
+        raise MotionError(f"motions={folder}: holds neither {MANIFEST} nor .npy clips; give a folder with clips")
+    datasets = {file: _read_dataset(file) for file in files if file.suffix.lower() in _YAML}
+    if not datasets:
+        return _load_poselib(clips, character)
+    complete = {file: weights for file, weights in datasets.items() if set(weights) <= set(clips)}
+    if not complete:
+        file, weights = next(iter(datasets.items()))
+        missing = min(set(weights) - set(clips)).name
+        raise MotionError(
+            f"{file}: lists {missing[:80]!a}, which is not in the folder; add the clip or remove the entry"
+        )
+    if len(complete) > 1:
+        names = ", ".join(file.name for file in complete)
+        raise MotionError(f"motions={folder}: holds several datasets ({names}); give the path of one of them instead")
+    return _load_poselib(next(iter(complete.values())), character)
+
+
+def _load_poselib(weights: dict[Path, float], character: Character) -> list[Clip]:
+    return [read_poselib(read_bytes(file), file, character, weight) for file, weight in weights.items()]
+
+
+def _read_dataset(file: Path) -> dict[Path, float]:
+    """The clips that a dataset yaml lists, beside it, and their weights, in its order.
+
+    Raises:
+        MotionError: no YAML, or an entry without a plain file name and a weight above 0.
+    """
+    try:
+        content: Any = yaml.safe_load(read_bytes(file))
+    except (yaml.YAMLError, ValueError, TypeError, RecursionError):  # PyYAML lets some of its own stumbles through
+        raise MotionError(f"{file}: is no YAML; it should read {_DATASET}") from None
+    entries = content.get("motions") if isinstance(content, dict) else None
+    if not isinstance(entries, list) or not entries:
+        raise MotionError(f"{file}: lists no clips; it should read {_DATASET}")
+    weights: dict[Path, float] = {}
+    for i, entry in enumerate(entries):
+        name, weight = (entry.get("file"), entry.get("weight")) if isinstance(entry, dict) else (None, None)
+        if not isinstance(name, str) or Path(name).name != name or file.parent / name in weights:
+            raise MotionError(f"{file}: motions[{i}].file must be the name of a clip beside it, and listed only once")
+        if not isinstance(weight, (int, float)) or not 0.0 < weight < 1e9:
+            raise MotionError(f"{file}: motions[{i}].weight must be a number above 0; correct it or remove the entry")
+        weights[file.parent / name] = float(weight)
+    return weights

@@ -1,0 +1,125 @@
+"""A library of clips as tensors: sampling, poses at any time, and windows of the state for discriminators."""
+
+from collections.abc import Sequence
+from itertools import accumulate
+
+import torch
+from torch import Tensor
+
+from murmillo.envs.character import CONTROL_DT, Character
+from murmillo.envs.errors import MotionError
+from murmillo.envs.motion.clip import Clip, check_clip
+from murmillo.envs.motion.velocities import clip_velocities
+from murmillo.envs.observations import character_state
+from murmillo.envs.rotations import slerp
+
+_ON_FRAME = 1e-4
+"""[frames] A time this near to a frame is the frame's: times that went through float32 would else miss it."""
+
+
+class MotionLibrary:
+    """The clips of one character, flattened into frame tensors.
+
+    Attributes:
+        clips: the C clips, checked.
+        skills: the labels, sorted, each once.
+        clip_skill: [C] int64 index into `skills`.
+        weight: [C] float64 sampling weights, as the clips have them.
+        duration: [C] float64 [s].
+    """
+
+    def __init__(self, clips: Sequence[Clip], character: Character, device: str | torch.device = "cpu") -> None:
+        if not clips:
+            raise MotionError("a motion library needs at least one clip; there is none")
+        self.character = character
+        self.device = torch.device(device)
+        self.clips = tuple(check_clip(clip, character) for clip in clips)
+        self.skills = tuple(sorted({clip.label for clip in clips}))
+        self.clip_skill = torch.tensor([self.skills.index(clip.label) for clip in clips], device=self.device)
+        self.weight = torch.tensor([clip.weight for clip in clips], dtype=torch.float64, device=self.device)
+        self.duration = torch.tensor([clip.duration for clip in clips], dtype=torch.float64, device=self.device)
+        self._fps = torch.tensor([clip.fps for clip in clips], dtype=torch.float64, device=self.device)
+        starts = list(accumulate((clip.frames for clip in clips), initial=0))
+        self._first = torch.tensor(starts[:-1], device=self.device)
+        self._last = torch.tensor(starts[1:], device=self.device) - 1
+        poses = [torch.tensor(clip.qpos) for clip in self.clips]
+        velocities = [clip_velocities(character, qpos, clip.fps) for qpos, clip in zip(poses, self.clips, strict=True)]
+        self._qpos = torch.cat(poses).to(self.device, torch.float32)
+        self._qvel = torch.cat(velocities).to(self.device, torch.float32)
+        self._quat_columns = [slice(3, 7), *(joint.qpos for joint in character.joints if joint.kind == "ball")]
+        self._quat = torch.stack([self._qpos[:, columns] for columns in self._quat_columns], dim=1)
+        self._by_skill = torch.argsort(self.clip_skill, stable=True)
+        self._cumulative = torch.cumsum(self.weight[self._by_skill], 0)
+        counts = torch.bincount(self.clip_skill, minlength=len(self.skills))
+        self._skill_ends = torch.cat((torch.zeros_like(counts[:1]), torch.cumsum(counts, 0)))
+
+    def sample(self, n: int, generator: torch.Generator, skill: Tensor | None = None) -> tuple[Tensor, Tensor]:
+        """Draw n moments: a clip by its weight, a time uniform in its duration.
+
+        Args:
+            skill: [n] int64 indices into `skills`; each draw is then among the clips of its skill.
+
+        Returns:
+            clip [n] int64 and time [n] float64 [s].
+
+        Raises:
+            MotionError: a skill that the library does not have.
+        """
+        ends = self._skill_ends
+        if skill is None:
+            first, after = ends[:1], ends[-1:]
+        else:
+            skill = skill.to(self.device)
+            if skill.shape != (n,) or (n and not 0 <= int(skill.min()) <= int(skill.max()) < len(self.skills)):
+                raise MotionError(f"skill must be [{n}] indices of the {len(self.skills)} skills in .skills")
+            first, after = ends[skill], ends[skill + 1]
+        u, v = torch.rand(2, n, dtype=torch.float64, generator=generator, device=generator.device).to(self.device)
+        # the clips lie along a line, each as long as its weight, those of a skill side by side
+        low = torch.where(first > 0, self._cumulative[first - 1], 0.0)
+        point = low + u * (self._cumulative[after - 1] - low)
+        index = torch.searchsorted(self._cumulative, point, right=True)
+        clip = self._by_skill[torch.minimum(torch.maximum(index, first), after - 1)]
+        return clip, v * self.duration[clip]
+
+    def pose(self, clip: Tensor, time: Tensor) -> tuple[Tensor, Tensor]:
+        """Poses and velocities at these moments.
+
+        Positions and hinges are interpolated linearly, rotations along the shorter arc; velocities are those of the
+        frame before, as in the papers' code.
+
+        Args:
+            clip: [n] int64.
+            time: [n] [s], clamped to the clip's duration.
+
+        Returns:
+            qpos [n, nq] and qvel [n, nv], float32, in MuJoCo's layout.
+        """
+        frame = time.double() * self._fps[clip]
+        nearest = frame.round()
+        frame = torch.where((frame - nearest).abs() < _ON_FRAME, nearest, frame).clamp_min(0.0)
+        frame = torch.minimum(frame + self._first[clip], self._last[clip].double())
+        below = frame.long()
+        above = torch.minimum(below + 1, self._last[clip])
+        part = (frame - below).float().unsqueeze(-1)
+        qpos = torch.lerp(self._qpos.index_select(0, below), self._qpos.index_select(0, above), part)
+        quat = slerp(self._quat.index_select(0, below), self._quat.index_select(0, above), part)
+        for columns, rotation in zip(self._quat_columns, quat.unbind(1), strict=True):
+            qpos[:, columns] = rotation
+        return qpos, self._qvel.index_select(0, below)
+
+    def window(self, clip: Tensor, time: Tensor, frames: int) -> Tensor:
+        """Windows of the state that end at these moments.
+
+        Args:
+            clip: [n] int64.
+            time: [n] [s].
+            frames: states in a window, one control step apart.
+
+        Returns:
+            [n, frames, 120] float32, oldest first. Before the clip begins its first frame is repeated.
+        """
+        back = torch.arange(frames - 1, -1, -1, dtype=torch.float64, device=self.device) * CONTROL_DT
+        times = time.double().unsqueeze(-1) - back
+        qpos, qvel = self.pose(clip.repeat_interleave(frames), times.flatten())
+        state = character_state(self.character, qpos, qvel, self.character.key_positions(qpos))
+        return state.unflatten(0, (len(clip), frames))
