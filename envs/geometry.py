@@ -1,5 +1,8 @@
 """How far the character's bodies reach down."""
 
+from dataclasses import dataclass
+from functools import lru_cache
+
 import mujoco
 import torch
 from torch import Tensor
@@ -7,40 +10,55 @@ from torch import Tensor
 from murmillo.envs.character import Character
 from murmillo.envs.rotations import quat_mul, quat_rotate
 
-_SPHERE, _CAPSULE, _CYLINDER, _BOX = (
-    mujoco.mjtGeom.mjGEOM_SPHERE,
-    mujoco.mjtGeom.mjGEOM_CAPSULE,
-    mujoco.mjtGeom.mjGEOM_CYLINDER,
-    mujoco.mjtGeom.mjGEOM_BOX,
-)
-
 
 def lowest_point(character: Character, qpos: Tensor) -> Tensor:
     """Height [...] [m] of the lowest point of any geom that can touch the ground, in the pose qpos [..., nq]."""
     pos, quat = character.forward_kinematics(qpos)
+    geoms = _geoms(character)
+    quat = quat[..., geoms.body, :]
+    centre = pos[..., geoms.body, 2] + quat_rotate(quat, geoms.pos.to(qpos))[..., 2]
+    w, x, y, z = quat_mul(quat, geoms.quat.to(qpos)).unbind(-1)
+    # heights of a geom's own axes: the lowest point is reached along them
+    rise_x, rise_y = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x)
+    rise_z = 1.0 - 2.0 * (x * x + y * y)
+    radius, disc, half = geoms.radius.to(qpos), geoms.disc.to(qpos), geoms.half.to(qpos)
+    along = half[:, 0] * rise_x.abs() + half[:, 1] * rise_y.abs() + half[:, 2] * rise_z.abs()
+    across = disc * (1.0 - rise_z.square()).clamp_min(0.0).sqrt()
+    return (centre - radius - along - across).amin(-1)
+
+
+@dataclass(frozen=True)
+class _Geoms:
+    """G geoms: their bodies and frames [G, 3], [G, 4] there, and what they reach.
+
+    A ball of `radius` [G] is swept along the axes by `half` [G, 3] and over a disc of radius `disc` [G] across z [m].
+    """
+
+    body: Tensor
+    pos: Tensor
+    quat: Tensor
+    radius: Tensor
+    disc: Tensor
+    half: Tensor
+
+
+@lru_cache(maxsize=8)
+def _geoms(character: Character) -> _Geoms:
     model = character.model
-    lows = []
-    for geom in range(model.ngeom):
-        body = int(model.geom_bodyid[geom]) - 1
-        if body < 0:
-            continue
-        offset, rotation = (torch.from_numpy(x[geom].copy()).to(qpos) for x in (model.geom_pos, model.geom_quat))
-        centre = pos[..., body, 2] + quat_rotate(quat[..., body, :], offset)[..., 2]
-        lows.append(centre - _reach(model, geom, quat_mul(quat[..., body, :], rotation)))
-    return torch.stack(lows, dim=-1).amin(-1)
-
-
-def _reach(model: mujoco.MjModel, geom: int, quat: Tensor) -> Tensor:
-    """How far [...] [m] a geom with rotation quat [..., 4] reaches below its centre."""
-    kind, size = model.geom_type[geom], torch.from_numpy(model.geom_size[geom].copy()).to(quat)
-    # the height of the geom's own x, y and z axes; a point of the geom is a combination of them
-    rise = torch.stack([quat_rotate(quat, axis)[..., 2] for axis in torch.eye(3).to(quat)], dim=-1).abs()
-    if kind == _SPHERE:
-        return size[0].expand(quat.shape[:-1])
-    if kind == _CAPSULE:
-        return size[0] + size[1] * rise[..., 2]
-    if kind == _CYLINDER:
-        return size[0] * (1.0 - rise[..., 2] ** 2).clamp_min(0.0).sqrt() + size[1] * rise[..., 2]
-    if kind == _BOX:
-        return (size * rise).sum(-1)
-    raise NotImplementedError(f"geom {model.geom(geom).name}: no reach for {mujoco.mjtGeom(kind).name}")
+    ids = [geom for geom in range(model.ngeom) if model.geom_bodyid[geom] > 0]
+    radius, disc, half = torch.zeros(len(ids)), torch.zeros(len(ids)), torch.zeros(len(ids), 3)
+    radius, disc, half = radius.double(), disc.double(), half.double()
+    for i, geom in enumerate(ids):
+        kind, size = mujoco.mjtGeom(model.geom_type[geom]), model.geom_size[geom]
+        if kind == mujoco.mjtGeom.mjGEOM_SPHERE:
+            radius[i] = size[0]
+        elif kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
+            radius[i], half[i, 2] = size[0], size[1]
+        elif kind == mujoco.mjtGeom.mjGEOM_CYLINDER:
+            disc[i], half[i, 2] = size[0], size[1]
+        elif kind == mujoco.mjtGeom.mjGEOM_BOX:
+            half[i] = torch.from_numpy(size.copy())
+        else:
+            raise NotImplementedError(f"geom {model.geom(geom).name}: no reach for {kind.name}")
+    pos, quat = torch.from_numpy(model.geom_pos[ids].copy()), torch.from_numpy(model.geom_quat[ids].copy())
+    return _Geoms(torch.as_tensor(model.geom_bodyid[ids] - 1).long(), pos, quat, radius, disc, half)

@@ -283,10 +283,11 @@ class HumanoidVectorEnv(VectorEnv):
         self._free_steps = (self._free_steps - 1).clamp_min(0)
         self._history = torch.cat((self._history[:, 1:], self._frame().unsqueeze(1)), dim=1)
 
-    def _frame(self) -> Tensor:
-        """[N, 120] the current state."""
+    def _frame(self, env_ids: Tensor | slice = slice(None)) -> Tensor:
+        """[n, 120] the current states of these worlds."""
         state = self.state
-        return character_state(self.character, state.qpos, state.qvel, state.key_pos_w).clamp(-STATE_LIMIT, STATE_LIMIT)
+        qpos, qvel, keys = state.qpos[env_ids], state.qvel[env_ids], state.key_pos_w[env_ids]
+        return character_state(self.character, qpos, qvel, keys).clamp(-STATE_LIMIT, STATE_LIMIT)
 
     def _restart(self, mask: Tensor, kind: int | None = None) -> None:
         """New episodes in the worlds of mask [N] bool."""
@@ -296,8 +297,8 @@ class HumanoidVectorEnv(VectorEnv):
         starts = self._starts.draw(self._fell[ids], self._generator, kind)
         moved = starts.kind != RECOVERY
         self.physics.write(ids[moved], starts.qpos[moved], starts.qvel[moved])
-        history, frame = self._history.clone(), self._frame()
-        history[ids[moved]] = frame[ids[moved]].unsqueeze(1)
+        history = self._history.clone()
+        history[ids[moved]] = self._frame(ids[moved]).unsqueeze(1)
         past = (starts.kind == REFERENCE).nonzero().squeeze(-1)
         if self.config.window > 1 and len(past):
             window = self.library.window(starts.clip[past], starts.time[past], self.config.window)
