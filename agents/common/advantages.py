@@ -1,0 +1,39 @@
+"""Generalised advantage estimation (Schulman et al. 2015) that keeps an end and a time limit apart."""
+
+import torch
+from torch import Tensor
+
+
+def gae(
+    reward: Tensor, value: Tensor, next_value: Tensor, terminated: Tensor, done: Tensor, gamma: float, lam: float
+) -> Tensor:
+    """Advantages `[T, N]`; add `value` for the TD(lambda) targets.
+
+        delta_t = r_t + gamma (1 - terminated_t) V(s'_t) - V(s_t)
+        A_t     = delta_t + gamma lam (1 - done_t) A_{t+1}
+
+    A termination has no future. A truncation has one, `next_value` of the true last observation. Both cut the trace.
+
+    Args:
+        reward: `[T, N]`.
+        value: V(s_t) `[T, N]`.
+        next_value: V of the true successor `[T, N]`.
+        terminated: bool `[T, N]`, the episode ended in failure or success.
+        done: bool `[T, N]`, terminated or truncated.
+        gamma: discount.
+        lam: trace decay.
+    """
+    delta = reward + gamma * next_value * ~terminated - value
+    decay = gamma * lam * (~done).to(reward.dtype)
+    advantage = torch.empty_like(delta)
+    trace = torch.zeros_like(delta[0])
+    for t in reversed(range(len(delta))):
+        trace = delta[t] + decay[t] * trace
+        advantage[t] = trace
+    return advantage
+
+
+def normalise_advantage(advantage: Tensor, eps: float = 1e-5) -> Tensor:
+    """Mean 0 and standard deviation 1 over the whole rollout, any shape."""
+    std, mean = torch.std_mean(advantage, correction=0)
+    return (advantage - mean) / (std + eps)

@@ -1,0 +1,177 @@
+"""Tells windows of the agent's motion from windows of the demonstrations (ASE, sections 5.1 and 6.3).
+
+What makes the methods differ is only the `Condition`: nothing (ASE), a latent beside the window (CALM), one output a
+skill (C·ASE). The losses and the reward are the same for all of them.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional as F
+
+from murmillo.agents.common.networks import linear, mlp
+from murmillo.agents.common.normalizer import RunningNormalizer
+
+
+@dataclass
+class DiscriminatorConfig:
+    """Structure and training of a discriminator (and of an encoder on its trunk).
+
+    Attributes:
+        hidden: sizes of the trunk's layers.
+        learning_rate: Adam's step.
+        minibatch: K, windows a step from the rollout, from the replay and from the demonstrations each.
+        updates: steps an iteration; the released code takes one with every policy minibatch, 8 x 6 = 48.
+        gradient_penalty: w_gp of eq. 14, on the logit's gradient at the normalised demonstrations.
+        logit_decay: on the squared weights of the last layer (released code).
+        weight_decay: on the squared weights of trunk and last layer (released code).
+        replay_size: windows kept from earlier iterations (released code).
+        replay_keep: probability that a window enters the full replay (released code).
+    """
+
+    hidden: tuple[int, ...] = (1024, 1024, 512)
+    learning_rate: float = 2e-5
+    minibatch: int = 4096
+    updates: int = 48
+    gradient_penalty: float = 5.0
+    logit_decay: float = 0.01
+    weight_decay: float = 1e-4
+    replay_size: int = 200_000
+    replay_keep: float = 0.01
+
+
+class Windows(NamedTuple):
+    """Windows `[B, W, D]`, oldest frame first, and what the discriminator is told about each, `[B, ...]` or nothing."""
+
+    window: Tensor
+    condition: Tensor | None = None
+
+
+class Condition(nn.Module):
+    """How the discriminator learns what it is to judge by. This one is told nothing (ASE)."""
+
+    inputs = 0
+    """Columns that `join` adds."""
+    outputs = 1
+    """Logits of the last layer, from which `pick` chooses."""
+
+    def join(self, x: Tensor, condition: Tensor | None) -> Tensor:
+        """The trunk's input `[B, W D + inputs]` from normalised flat windows `[B, W D]`."""
+        return x
+
+    def pick(self, logits: Tensor, condition: Tensor | None) -> Tensor:
+        """One logit a window, `[B]` from `[B, outputs]`."""
+        return logits[:, 0]
+
+
+class Discriminator(nn.Module):
+    """A logit for every window: positive for a demonstration, negative for the agent."""
+
+    def __init__(
+        self,
+        frames: int,
+        state_dim: int,
+        config: DiscriminatorConfig,
+        generator: torch.Generator,
+        condition: Condition | None = None,
+    ) -> None:
+        """
+        Args:
+            frames: W, frames a window.
+            state_dim: D, features a frame.
+            config: sizes and weights.
+            generator: draws the initial weights.
+            condition: what it is told beside the window.
+        """
+        super().__init__()
+        self.config = config
+        self.condition = condition or Condition()
+        # one normaliser for all frames: a feature has the same scale wherever it stands in the window, and a stationary
+        # feature cannot be told from its place in it
+        self.normalizer = RunningNormalizer((state_dim,))
+        self.trunk = mlp([frames * state_dim + self.condition.inputs, *config.hidden], generator)
+        self.head = linear(config.hidden[-1], self.condition.outputs, generator, bound=1.0)
+
+    def prepare(self, window: Tensor) -> Tensor:
+        """Normalised flat windows `[B, W D]` from raw ones `[B, W, D]`."""
+        return self.normalizer(window).flatten(1)
+
+    def features(self, x: Tensor, condition: Tensor | None = None) -> Tensor:
+        """The trunk's last layer `[B, H]` on prepared windows `[B, W D]`; an encoder may sit on it."""
+        return self.trunk(self.condition.join(x, condition))
+
+    def judge(self, features: Tensor, condition: Tensor | None = None) -> Tensor:
+        """Logits `[B]` from features `[B, H]`."""
+        return self.condition.pick(self.head(features), condition)
+
+    def logits(self, window: Tensor, condition: Tensor | None = None) -> Tensor:
+        """Logits `[B]` of raw windows `[B, W, D]`."""
+        return self.judge(self.features(self.prepare(window), condition), condition)
+
+
+@dataclass(frozen=True)
+class DiscriminatorLoss:
+    """Weighted parts of the loss and scores to log, by name; the agent's windows again, for an encoder.
+
+    Attributes:
+        agent_inputs: prepared windows `[B, W D]`.
+        agent_features: the trunk's features of them `[B, H]`, with their graph.
+    """
+
+    parts: dict[str, Tensor]
+    scores: dict[str, Tensor]
+    agent_inputs: Tensor
+    agent_features: Tensor
+
+
+def discriminator_loss(
+    discriminator: Discriminator, agent: Windows, replay: Windows, demonstration: Windows
+) -> DiscriminatorLoss:
+    """ASE's eq. 14 with the regularisers of the released code, as named parts whose sum is minimised.
+
+        1/2 [ BCE(agent and replay, 0) + BCE(demonstration, 1) ] + w_gp E ||d logit / dx||^2
+            + logit_decay ||w_logit||^2 + weight_decay ||w||^2
+
+    Eq. 14 sums its two expectations without the 1/2; with it, w_gp = 5 means what it means in the released code. The
+    gradient penalty is on the logit at the *normalised* demonstrations, since only so is the weight free of units.
+    """
+    config = discriminator.config
+    x = discriminator.prepare(demonstration.window).requires_grad_()
+    demo_logits = discriminator.judge(discriminator.features(x, demonstration.condition), demonstration.condition)
+    agent_inputs = discriminator.prepare(agent.window)
+    agent_features = discriminator.features(agent_inputs, agent.condition)
+    agent_logits = discriminator.judge(agent_features, agent.condition)
+    replay_logits = discriminator.logits(replay.window, replay.condition)
+
+    share = 0.5 / (len(agent_logits) + len(replay_logits))
+    weights = [layer.weight for layer in discriminator.trunk if isinstance(layer, nn.Linear)]
+    logit_square = discriminator.head.weight.square().sum()
+    parts = {
+        "agent": share * F.softplus(agent_logits).sum(),
+        "replay": share * F.softplus(replay_logits).sum(),
+        "demonstration": 0.5 * F.softplus(-demo_logits).mean(),
+        "gradient_penalty": config.gradient_penalty * gradient_penalty(demo_logits, x),
+        "logit_decay": config.logit_decay * logit_square,
+        "weight_decay": config.weight_decay * (logit_square + sum(weight.square().sum() for weight in weights)),
+    }
+    with torch.no_grad():
+        scores = {
+            "agent_score": agent_logits.sigmoid().mean(),
+            "demonstration_score": demo_logits.sigmoid().mean(),
+            "agent_accuracy": (agent_logits < 0).float().mean(),
+            "demonstration_accuracy": (demo_logits > 0).float().mean(),
+        }
+    return DiscriminatorLoss(parts, scores, agent_inputs, agent_features)
+
+
+def gradient_penalty(logits: Tensor, x: Tensor) -> Tensor:
+    """E ||d logit / dx||^2 of logits `[B]` at the inputs `[B, ...]` that they came from, ready to be differentiated."""
+    (gradient,) = torch.autograd.grad(logits.sum(), x, create_graph=True)
+    return gradient.flatten(1).square().sum(-1).mean()
+
+
+def style_reward(logits: Tensor, scale: float = 1.0) -> Tensor:
+    """-scale log max(1 - D, 1e-4) with D = sigmoid(logit), any shape: 0 to 9.2 at scale 1 (the released code has 2)."""
+    return -scale * torch.sigmoid(-logits).clamp(min=1e-4).log()

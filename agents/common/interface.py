@@ -1,0 +1,72 @@
+"""What the runner asks of an agent, and what an agent asks of its demonstrations."""
+
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+import torch
+from torch import Tensor
+
+from murmillo.agents.common.rollout import Rollout
+
+Obs = dict[str, Tensor]
+"""Named observations, float32 or int64 tensors `[N, ...]`: "state", "skill" and, where asked for, "window"."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """One action of every world.
+
+    Attributes:
+        action: `[N, A]`, as drawn; the environment clamps it to [-1, 1], the log probability is of the unclamped one.
+        log_prob: `[N]`.
+        extras: what the agent must see again when it learns from this step, `[N, ...]` each: a latent, a label.
+    """
+
+    action: Tensor
+    log_prob: Tensor
+    extras: dict[str, Tensor] = field(default_factory=dict)
+
+
+class Agent(Protocol):
+    """A learner. It owns its networks, optimisers and latents, and neither environment nor loop."""
+
+    needs: frozenset[str]
+    """The observations it reads again after collection, as rollout fields: "state", "next_state", "next_window", ..."""
+
+    def act(self, obs: Obs, *, deterministic: bool = False) -> Step:
+        """Act once in every world; advances the clocks of the latents."""
+        ...
+
+    def value(self, obs: Obs, extras: dict[str, Tensor]) -> Tensor:
+        """Expected return `[...]` of observations `[..., D]`, in the reward's own units."""
+        ...
+
+    def reset(self, env_ids: Tensor) -> None:
+        """Begin new episodes in these worlds (`[n]` int64): redraw latents and labels."""
+        ...
+
+    def rewards(self, rollout: Rollout) -> dict[str, Tensor]:
+        """The agent's own reward terms by name, each `[T, N]`; the runner weights, sums and logs them."""
+        ...
+
+    def update(self, rollout: Rollout) -> dict[str, float]:
+        """Learn from a rollout with "advantage" and "return"; the means of losses and scores, by name."""
+        ...
+
+    def state_dict(self) -> dict[str, Any]:
+        """All that changes while training, as nested dicts of tensors and JSON values."""
+        ...
+
+    def load_state_dict(self, state: dict[str, Any]) -> None: ...
+
+
+class Demonstrations(Protocol):
+    """Draws windows of the reference motions: `{"window": [n, W, D], "skill": [n]}`, oldest frame first."""
+
+    def __call__(self, n: int, generator: torch.Generator, skill: Tensor | None = None) -> dict[str, Tensor]: ...
+
+
+class ImitationPairs(Protocol):
+    """Draws states of the reference motions and the actions that lead on: `{"state": [n, D], "action": [n, A]}`."""
+
+    def __call__(self, n: int, generator: torch.Generator) -> dict[str, Tensor]: ...

@@ -1,0 +1,52 @@
+"""Latent skills on the unit sphere: the one sampler, and the clocks that decide when a world gets a new one."""
+
+from typing import Any
+
+import torch
+from torch import Tensor
+from torch.nn import functional as F
+
+from murmillo.agents.common.errors import AgentError
+
+
+def sample_sphere(n: int, dim: int, generator: torch.Generator) -> Tensor:
+    """`[n, dim]` uniform on the unit sphere: normalised Gaussians (ASE, eq. 11)."""
+    return F.normalize(torch.randn(n, dim, generator=generator), dim=-1)
+
+
+class LatentSequence:
+    """Every world's sequence of latents, each kept for a uniform 1 to 150 steps (ASE, section 6.4 and appendix A)."""
+
+    def __init__(
+        self, num_envs: int, dim: int, generator: torch.Generator, min_steps: int = 1, max_steps: int = 150
+    ) -> None:
+        if not 1 <= min_steps <= max_steps:
+            raise AgentError(f"latent_steps=[{min_steps}, {max_steps}] is no range of steps; the paper has [1, 150]")
+        self.dim = dim
+        self.min_steps = min_steps
+        self.max_steps = max_steps
+        self.generator = generator
+        self.latent = torch.zeros(num_envs, dim)
+        self.steps_left = torch.zeros(num_envs, dtype=torch.int64)
+        self.reset(torch.arange(num_envs))
+
+    def step(self) -> Tensor:
+        """The latents of this step `[N, dim]`; a latent whose time is over is redrawn first."""
+        expired = (self.steps_left == 0).nonzero().flatten()
+        if len(expired):
+            self.reset(expired)
+        self.steps_left -= 1
+        return self.latent.clone()
+
+    def reset(self, env_ids: Tensor) -> None:
+        """New latents and durations for these worlds, `[n]` int64."""
+        n = len(env_ids)
+        self.latent[env_ids] = sample_sphere(n, self.dim, self.generator)
+        self.steps_left[env_ids] = torch.randint(self.min_steps, self.max_steps + 1, (n,), generator=self.generator)
+
+    def state_dict(self) -> dict[str, Any]:
+        return {"latent": self.latent, "steps_left": self.steps_left}
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        self.latent.copy_(state["latent"])
+        self.steps_left.copy_(state["steps_left"])

@@ -1,0 +1,77 @@
+"""The networks that every agent builds from: fully connected layers and a Gaussian policy."""
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+
+import torch
+from torch import Tensor, nn
+
+from murmillo.agents.common.errors import AgentError
+
+
+def linear(inputs: int, outputs: int, generator: torch.Generator, bound: float | None = None) -> nn.Linear:
+    """A layer with weights ~ U(-bound, bound), PyTorch's own 1 / sqrt(inputs) unless given, and zero biases."""
+    layer = nn.Linear(inputs, outputs)
+    bound = 1 / math.sqrt(inputs) if bound is None else bound
+    nn.init.uniform_(layer.weight, -bound, bound, generator=generator)
+    nn.init.zeros_(layer.bias)
+    return layer
+
+
+def mlp(sizes: Sequence[int], generator: torch.Generator) -> nn.Sequential:
+    """Layers of the given sizes, the input's first, with a ReLU after every one."""
+    layers: list[nn.Module] = []
+    for inputs, outputs in pairwise(sizes):
+        layers += [linear(inputs, outputs, generator), nn.ReLU()]
+    return nn.Sequential(*layers)
+
+
+def style_mlp(latent_dim: int, hidden: Sequence[int], generator: torch.Generator) -> nn.Sequential:
+    """The released code's map of a latent before the policy sees it: hidden ReLU layers, then tanh back to its size."""
+    sizes = [latent_dim, *hidden]
+    return nn.Sequential(mlp(sizes, generator), linear(sizes[-1], latent_dim, generator, bound=1.0), nn.Tanh())
+
+
+class GaussianPolicy(nn.Module):
+    """pi(a | s, c) = N(mu(s, c), diag std^2) with a fixed std (ASE, section 8.2)."""
+
+    log_std: Tensor
+
+    def __init__(
+        self,
+        state_dim: int,
+        action_dim: int,
+        hidden: Sequence[int],
+        std: float,
+        generator: torch.Generator,
+        *,
+        condition_dim: int = 0,
+        style_hidden: Sequence[int] = (),
+        mean_init_scale: float = 1.0,
+    ) -> None:
+        """
+        Args:
+            state_dim: D.
+            action_dim: A.
+            hidden: sizes of the hidden layers.
+            std: standard deviation of every action dimension, in units of the action.
+            generator: draws the initial weights.
+            condition_dim: C, size of the latent or label beside the state; 0 for none.
+            style_hidden: hidden sizes of the style network in front of the condition; empty for none.
+            mean_init_scale: factor on the initial weights of the last layer.
+        """
+        super().__init__()
+        if std <= 0:
+            raise AgentError(f"ppo.std={std} is no standard deviation; the paper has 0.05")
+        self.style = style_mlp(condition_dim, style_hidden, generator) if style_hidden else nn.Identity()
+        self.trunk = mlp([state_dim + condition_dim, *hidden], generator)
+        self.head = linear(hidden[-1], action_dim, generator)
+        with torch.no_grad():
+            self.head.weight *= mean_init_scale
+        self.register_buffer("log_std", torch.full((action_dim,), std).log())
+
+    def forward(self, state: Tensor, condition: Tensor | None = None) -> Tensor:
+        """Mean action `[..., A]` of normalised states `[..., D]` under conditions `[..., C]`."""
+        inputs = state if condition is None else torch.cat([state, self.style(condition)], -1)
+        return self.head(self.trunk(inputs))

@@ -1,0 +1,55 @@
+"""Running mean and variance, for observations, windows and returns."""
+
+import torch
+from torch import Tensor, nn
+
+
+class RunningNormalizer(nn.Module):
+    """(x - mean) / sqrt(var + eps), clipped; the statistics are float64 and move only in `update`.
+
+    Until the first update it only clips. The loop updates it once an iteration, after the update that used it, so that
+    the actions of a rollout and the losses on it see one and the same normalisation.
+    """
+
+    mean: Tensor
+    var: Tensor
+    count: Tensor
+    frozen: Tensor
+
+    def __init__(self, shape: tuple[int, ...] = (), clip: float = 5.0, eps: float = 1e-5) -> None:
+        super().__init__()
+        self.clip = clip
+        self.eps = eps
+        self.register_buffer("mean", torch.zeros(shape, dtype=torch.float64))
+        self.register_buffer("var", torch.ones(shape, dtype=torch.float64))
+        self.register_buffer("count", torch.zeros((), dtype=torch.float64))
+        self.register_buffer("frozen", torch.tensor(False))
+
+    def forward(self, x: Tensor) -> Tensor:
+        """Normalise `[..., *shape]` to about unit size, within +-clip."""
+        return ((x - self.mean.to(x.dtype)) / self._std(x)).clamp(-self.clip, self.clip)
+
+    def inverse(self, y: Tensor) -> Tensor:
+        """Undo `forward`, but for the clipping."""
+        return y * self._std(y) + self.mean.to(y.dtype)
+
+    def _std(self, like: Tensor) -> Tensor:
+        return torch.sqrt(self.var + self.eps).to(like.dtype)
+
+    @torch.no_grad()
+    def update(self, batch: Tensor) -> None:
+        """Take in a batch `[..., *shape]` (Chan et al.'s parallel form of Welford's algorithm)."""
+        if self.frozen:
+            return
+        rows = batch.reshape(-1, *self.mean.shape).double()
+        total = self.count + len(rows)
+        var, mean = torch.var_mean(rows, dim=0, correction=0)
+        delta = mean - self.mean
+        moment = self.var * self.count + var * len(rows) + delta.square() * self.count * len(rows) / total
+        self.mean += delta * len(rows) / total
+        self.var.copy_(moment / total)
+        self.count.copy_(total)
+
+    def freeze(self) -> None:
+        """Stop learning, for good: a checkpoint remembers it."""
+        self.frozen.fill_(True)

@@ -1,0 +1,205 @@
+"""Proximal policy optimisation (Schulman et al. 2017) of a policy and a critic that may be told a condition."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import torch
+from torch import Tensor, nn
+
+from murmillo.agents.common.advantages import normalise_advantage
+from murmillo.agents.common.errors import AgentError
+from murmillo.agents.common.losses import (
+    action_bound_loss,
+    approx_kl,
+    clip_fraction,
+    gaussian_entropy,
+    gaussian_log_prob,
+    ppo_policy_loss,
+    value_loss,
+)
+from murmillo.agents.common.networks import GaussianPolicy, linear, mlp
+from murmillo.agents.common.normalizer import RunningNormalizer
+from murmillo.agents.common.rollout import Rollout
+from murmillo.agents.common.training import Means, adam, adam_state, load_adam_state, load_module
+
+Minibatch = dict[str, Tensor]
+"""Rows of a rollout by name, `[B, ...]`; "state" is normalised."""
+
+
+@dataclass
+class PPOConfig:
+    """Structure and training of policy and critic. Defaults: ASE's Table 2; where it is silent, its released code.
+
+    Attributes:
+        hidden: sizes of the hidden layers of policy and critic.
+        style_hidden: hidden sizes of the style network before the policy's condition; empty for none.
+        std: the policy's standard deviation; the paper's variance is 0.0025.
+        mean_init_scale: factor on the initial weights of the policy's last layer.
+        policy_learning_rate: Adam's step for the policy.
+        value_learning_rate: Adam's step for the critic.
+        epochs: passes over the rollout.
+        minibatch: samples a step.
+        clip: bound on the ratio's distance from 1.
+        bound_weight: of the loss on means beyond [-1, 1].
+        target_kl: stop the passes once a pass moved the policy further than this [nat]; None never stops.
+    """
+
+    hidden: tuple[int, ...] = (1024, 1024, 512)
+    style_hidden: tuple[int, ...] = (512, 256)
+    std: float = 0.05
+    mean_init_scale: float = 1.0
+    policy_learning_rate: float = 2e-5
+    value_learning_rate: float = 2e-5
+    epochs: int = 6
+    minibatch: int = 16384
+    clip: float = 0.2
+    bound_weight: float = 10.0
+    target_kl: float | None = None
+
+
+class ActorCritic(nn.Module):
+    """Policy and critic on normalised states; the critic predicts normalised returns.
+
+    The condition `[..., C]` reaches the policy through its style network and the critic raw.
+    """
+
+    def __init__(
+        self, state_dim: int, action_dim: int, condition_dim: int, config: PPOConfig, generator: torch.Generator
+    ) -> None:
+        super().__init__()
+        self.policy = GaussianPolicy(
+            state_dim,
+            action_dim,
+            config.hidden,
+            config.std,
+            generator,
+            condition_dim=condition_dim,
+            style_hidden=config.style_hidden if condition_dim else (),
+            mean_init_scale=config.mean_init_scale,
+        )
+        self.critic = nn.Sequential(
+            mlp([state_dim + condition_dim, *config.hidden], generator), linear(config.hidden[-1], 1, generator)
+        )
+        self.state_normalizer = RunningNormalizer((state_dim,))
+        self.return_normalizer = RunningNormalizer()
+
+    @torch.no_grad()
+    def act(
+        self, state: Tensor, condition: Tensor | None, generator: torch.Generator, deterministic: bool = False
+    ) -> tuple[Tensor, Tensor]:
+        """Actions `[N, A]` and their log probabilities `[N]` for raw states `[N, D]`."""
+        mean = self.policy(self.state_normalizer(state), condition)
+        action = mean
+        if not deterministic:
+            action = mean + self.policy.log_std.exp() * torch.randn(mean.shape, generator=generator)
+        return action, gaussian_log_prob(action, mean, self.policy.log_std)
+
+    @torch.no_grad()
+    def value(self, state: Tensor, condition: Tensor | None) -> Tensor:
+        """Expected returns `[...]` of raw states `[..., D]`, in the reward's units."""
+        return self.return_normalizer.inverse(self.normalised_value(self.state_normalizer(state), condition))
+
+    def normalised_value(self, state: Tensor, condition: Tensor | None) -> Tensor:
+        """What the critic itself predicts, `[...]` from normalised states `[..., D]`."""
+        inputs = state if condition is None else torch.cat([state, condition], -1)
+        return self.critic(inputs).squeeze(-1)
+
+
+class PPO:
+    """Updates an `ActorCritic` from a rollout with "advantage" and "return".
+
+    The released codes sum all losses under one Adam. Adam rescales each parameter's gradient by its own size and the
+    networks share no parameters, so the weights of that sum fall out; policy and critic have a learning rate each here,
+    and the reference's case is when all rates are 2e-5.
+    """
+
+    def __init__(self, model: ActorCritic, config: PPOConfig) -> None:
+        self.model = model
+        self.config = config
+        self.optimizer = adam(
+            (model.policy.parameters(), config.policy_learning_rate),
+            (model.critic.parameters(), config.value_learning_rate),
+        )
+
+    def update(
+        self,
+        rollout: Rollout,
+        generator: torch.Generator,
+        *,
+        fields: tuple[str, ...] = (),
+        condition: Callable[[Minibatch], Tensor | None] = lambda batch: None,
+        extra_loss: Callable[[Minibatch, Tensor], Mapping[str, Tensor]] = lambda batch, mean: {},
+    ) -> dict[str, float]:
+        """One iteration's passes over the rollout, then the normalisers.
+
+        Args:
+            rollout: with state, action, log_prob, advantage, return.
+            generator: draws the minibatches.
+            fields: further fields that the minibatches carry to `condition` and `extra_loss`.
+            condition: what policy and critic are told, `[B, C]`, from a minibatch; gradients flow into it.
+            extra_loss: further weighted losses of the policy by name, from a minibatch and the means `[B, A]`.
+
+        Returns:
+            means of the losses, the KL divergence [nat], the clipped share and the entropy [nat].
+
+        Raises:
+            AgentError: the minibatch is larger than the rollout.
+        """
+        config = self.config
+        if config.minibatch > rollout.samples:
+            raise AgentError(
+                f"ppo.minibatch={config.minibatch} is larger than the {rollout.samples} samples of an iteration "
+                f"({rollout.horizon} steps of {rollout.num_envs} worlds)"
+            )
+        data = {name: rollout.flat(name) for name in ("action", "log_prob", *fields)}
+        data["state"] = self.model.state_normalizer(rollout.flat("state"))
+        data["advantage"] = normalise_advantage(rollout.flat("advantage"))
+        data["target"] = self.model.return_normalizer(rollout.flat("return"))
+
+        means = Means()
+        for _ in range(config.epochs):
+            divergence = Means()
+            for rows in rollout.minibatches(config.minibatch, generator):
+                batch = {name: value[rows] for name, value in data.items()}
+                losses, scores = self._losses(batch, condition(batch), extra_loss)
+                self.optimizer.zero_grad()
+                torch.stack(list(losses.values())).sum().backward()
+                self.optimizer.step()
+                means.add({**losses, **scores})
+                divergence.add({"kl": scores["kl"]})
+            if config.target_kl is not None and divergence.result()["kl"] > config.target_kl:
+                break
+        self.model.state_normalizer.update(rollout["state"])
+        self.model.return_normalizer.update(rollout["return"])
+        return means.result()
+
+    def _losses(
+        self,
+        batch: Minibatch,
+        condition: Tensor | None,
+        extra_loss: Callable[[Minibatch, Tensor], Mapping[str, Tensor]],
+    ) -> tuple[dict[str, Tensor], dict[str, Tensor]]:
+        config, log_std = self.config, self.model.policy.log_std
+        mean = self.model.policy(batch["state"], condition)
+        log_prob = gaussian_log_prob(batch["action"], mean, log_std)
+        losses = {
+            "policy": ppo_policy_loss(log_prob, batch["log_prob"], batch["advantage"], config.clip),
+            "bound": config.bound_weight * action_bound_loss(mean),
+            **extra_loss(batch, mean),
+            "value": value_loss(self.model.normalised_value(batch["state"], condition), batch["target"]),
+        }
+        with torch.no_grad():
+            scores = {
+                "kl": approx_kl(log_prob, batch["log_prob"]),
+                "clipped": clip_fraction(log_prob, batch["log_prob"], config.clip),
+                "entropy": gaussian_entropy(log_std),
+            }
+        return losses, scores
+
+    def state_dict(self) -> dict[str, Any]:
+        return {"model": self.model.state_dict(), "optimizer": adam_state(self.optimizer)}
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        load_module(self.model, state["model"], "policy and critic")
+        load_adam_state(self.optimizer, state["optimizer"])

@@ -1,0 +1,230 @@
+"""The training loop: collect, reward, advantage, update, log, save."""
+
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import torch
+from gymnasium.vector import AutoresetMode, VectorEnv
+from torch import Tensor
+
+from murmillo.agents.common import checkpoint
+from murmillo.agents.common.advantages import gae
+from murmillo.agents.common.episodes import EpisodeStatistics
+from murmillo.agents.common.errors import AgentError
+from murmillo.agents.common.interface import Agent
+from murmillo.agents.common.logger import Logger
+from murmillo.agents.common.rollout import Rollout, tensors, true_next_obs
+
+
+@dataclass
+class RunnerConfig:
+    """How long to train and on what reward. Defaults: ASE's Table 2.
+
+    Attributes:
+        samples: end after this many, counted over all resumed runs.
+        horizon: T, steps of every world an iteration; 32 with 4,096 worlds makes the paper's 131,072 samples.
+        gamma: discount.
+        lam: lambda of GAE and of TD(lambda).
+        reward_weights: a weight for every reward term that the agent names, and for "task", the environment's own
+            reward, where it should count. 1 and beta = 0.5 are ASE's.
+        checkpoint_minutes: save this often, and at the end.
+        max_minutes: end after this much time, counted from `run`; None for no limit.
+    """
+
+    samples: int = 10_000_000_000
+    horizon: int = 32
+    gamma: float = 0.99
+    lam: float = 0.95
+    reward_weights: dict[str, float] = field(default_factory=lambda: {"style": 1.0, "skill": 0.5})
+    checkpoint_minutes: float = 10.0
+    max_minutes: float | None = None
+
+
+class Runner:
+    """Trains an agent in a vector environment, exactly resumable: N iterations and N more are 2 N, bit for bit.
+
+    That holds where the environment has `state_dict` and `load_state_dict` and draws its randomness from a state in it;
+    without them a resumed run begins with fresh episodes.
+    """
+
+    def __init__(
+        self,
+        env: VectorEnv,
+        agent: Agent,
+        config: RunnerConfig,
+        generator: torch.Generator,
+        checkpoint_folder: Path | str,
+        *,
+        meta: Mapping[str, Any] | None = None,
+        logger: Logger | None = None,
+        on_iteration: Sequence[Callable[[dict[str, float]], None]] = (),
+    ) -> None:
+        """
+        Args:
+            env: in SAME_STEP autoreset mode, with dict observations.
+            agent: draws from the same `generator`.
+            config: how long and on what.
+            generator: the run's one source of randomness outside the environment; seeds the environment too.
+            checkpoint_folder: where `save` writes.
+            meta: JSON values that a checkpoint must share to be loaded: character, dimensions, skills.
+            logger: takes every iteration's statistics.
+            on_iteration: called with every iteration's statistics.
+
+        Raises:
+            AgentError: the environment's autoreset mode is another.
+        """
+        mode = env.metadata.get("autoreset_mode")
+        if mode is not AutoresetMode.SAME_STEP:
+            raise AgentError(f"the environment's autoreset_mode is {mode}; the runner needs AutoresetMode.SAME_STEP")
+        self.env = env
+        self.agent = agent
+        self.config = config
+        self.generator = generator
+        self.checkpoint_folder = Path(checkpoint_folder)
+        self.meta = dict(meta or {})
+        self.logger = logger
+        self.on_iteration = on_iteration
+        self.samples = 0
+        self.iteration = 0
+        self._rollout = Rollout(config.horizon, env.num_envs)
+        self._episodes = EpisodeStatistics(env.num_envs)
+        self._obs: dict[str, Tensor] | None = None
+        self._extras: tuple[str, ...] = ()
+        self._stopping = False
+
+    def run(self) -> None:
+        """Train until the samples or the minutes are used up or `stop` is called; ends with a checkpoint."""
+        begun = saved = time.monotonic()
+        while not self._finished(begun):
+            started = time.monotonic()
+            rollout = self._collect()
+            rewards = self._reward(rollout)
+            self._advantage(rollout)
+            scalars = self.agent.update(rollout)
+            self._check(scalars)
+            self._log(rewards | scalars, time.monotonic() - started)
+            if time.monotonic() - saved > 60 * self.config.checkpoint_minutes:
+                self.save()
+                saved = time.monotonic()
+        self.save()
+
+    def stop(self) -> None:
+        """End `run` after the iteration under way; safe to call from a signal handler."""
+        self._stopping = True
+
+    def _finished(self, begun: float) -> bool:
+        minutes = (time.monotonic() - begun) / 60
+        limit = math.inf if self.config.max_minutes is None else self.config.max_minutes
+        return self._stopping or self.samples >= self.config.samples or minutes >= limit
+
+    def _collect(self) -> Rollout:
+        """T steps of every world."""
+        rollout = self._rollout
+        obs = self._obs if self._obs is not None else self._first_obs()
+        for t in range(self.config.horizon):
+            step = self.agent.act(obs)
+            seen = {name: value for name, value in obs.items() if name in self.agent.needs}
+            rollout.store(t, {**seen, **step.extras, "action": step.action, "log_prob": step.log_prob})
+            next_obs, reward, terminated, truncated, infos = self.env.step(step.action.numpy())
+
+            successor = {f"next_{name}": value for name, value in true_next_obs(next_obs, infos).items()}
+            successor = {name: value for name, value in successor.items() if name in self.agent.needs}
+            ends = {"terminated": torch.as_tensor(terminated), "truncated": torch.as_tensor(truncated)}
+            rollout.store(t, {**successor, **ends, "task": torch.as_tensor(reward)})
+            done = ends["terminated"] | ends["truncated"]
+            self._episodes.step(ends["terminated"], done)
+            if done.any():
+                self.agent.reset(done.nonzero().flatten())
+            obs = tensors(next_obs)
+            self._extras = tuple(step.extras)
+        self._obs = obs
+        return rollout
+
+    def _first_obs(self) -> dict[str, Tensor]:
+        seed = int(torch.randint(2**31, (), generator=self.generator))
+        obs, _ = self.env.reset(seed=seed)
+        self.agent.reset(torch.arange(self.env.num_envs))
+        return tensors(obs)
+
+    def _reward(self, rollout: Rollout) -> dict[str, float]:
+        """Sum the weighted terms into "reward"; the mean of every term and of the sum, by name."""
+        weights = {"task": 0.0, **self.config.reward_weights}
+        terms = {"task": rollout["task"], **self.agent.rewards(rollout)}
+        if terms.keys() != weights.keys():
+            raise AgentError(
+                f"reward_weights names {', '.join(sorted(self.config.reward_weights))}, "
+                f"but the terms are {', '.join(sorted(terms))}"
+            )
+        rollout["reward"] = torch.stack([weights[name] * term for name, term in terms.items()]).sum(0)
+        means = {f"reward/{name}": term.mean().item() for name, term in terms.items()}
+        return means | {"reward/total": rollout["reward"].mean().item()}
+
+    def _advantage(self, rollout: Rollout) -> None:
+        """Values in one batch, then "advantage" and "return"."""
+        extras = {name: rollout[name] for name in self._extras}
+        obs = {name: rollout[name] for name in self.agent.needs if not name.startswith("next_")}
+        next_obs = {name[5:]: rollout[name] for name in self.agent.needs if name.startswith("next_")}
+        value, next_value = self.agent.value(obs, extras), self.agent.value(next_obs, extras)
+        done = rollout["terminated"] | rollout["truncated"]
+        rollout["advantage"] = gae(
+            rollout["reward"], value, next_value, rollout["terminated"], done, self.config.gamma, self.config.lam
+        )
+        rollout["return"] = rollout["advantage"] + value
+
+    def _check(self, scalars: Mapping[str, float]) -> None:
+        for name, value in scalars.items():
+            if not math.isfinite(value):
+                raise AgentError(
+                    f"iteration {self.iteration + 1}: {name} is {value}; resume from the last checkpoint "
+                    f"({self.checkpoint_folder}) with a lower learning rate"
+                )
+
+    def _log(self, scalars: dict[str, float], seconds: float) -> None:
+        self.samples += self._rollout.samples
+        self.iteration += 1
+        stats = {
+            "samples": float(self.samples),
+            "iteration": float(self.iteration),
+            "samples_per_second": self._rollout.samples / seconds,
+            **self._episodes.summary(),
+            **scalars,
+        }
+        if self.logger is not None:
+            self.logger.log(self.samples, stats)
+        for callback in self.on_iteration:
+            callback(stats)
+
+    def save(self) -> None:
+        """Write all that the next iteration depends on to the checkpoint folder."""
+        state: dict[str, Any] = {
+            "meta": self.meta,
+            "agent": self.agent.state_dict(),
+            "generator": self.generator.get_state(),
+            "samples": self.samples,
+            "iteration": self.iteration,
+        }
+        if self._obs is not None and hasattr(self.env, "state_dict"):
+            state |= {"env": self.env.state_dict(), "obs": self._obs, "episodes": self._episodes.state_dict()}  # type: ignore
+        checkpoint.save(self.checkpoint_folder, state)
+
+    def load(self, folder: Path | str) -> None:
+        """Go on from a checkpoint, in a fresh runner of the same config.
+
+        Raises:
+            AgentError: it is damaged, or its `meta` is another's.
+        """
+        state = checkpoint.load(folder)
+        checkpoint.check_compatible(state["meta"], self.meta)
+        self.agent.load_state_dict(state["agent"])
+        self.samples, self.iteration = state["samples"], state["iteration"]
+        self.generator.set_state(state["generator"])
+        if "env" in state:
+            self.env.load_state_dict(state["env"])  # type: ignore
+            self._episodes.load_state_dict(state["episodes"])
+            self._obs = state["obs"]
+        if self.logger is not None:
+            self.logger.resume(self.samples)

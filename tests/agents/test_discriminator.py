@@ -1,0 +1,133 @@
+import math
+
+import pytest
+import torch
+from torch import Tensor, nn
+
+from murmillo.agents.common.discriminator import (
+    Condition,
+    Discriminator,
+    DiscriminatorConfig,
+    Windows,
+    discriminator_loss,
+    gradient_penalty,
+    style_reward,
+)
+
+
+def make(
+    generator: torch.Generator, condition: Condition | None = None, hidden: tuple[int, ...] = (8, 4)
+) -> Discriminator:
+    return Discriminator(2, 3, DiscriminatorConfig(hidden=hidden), generator, condition)
+
+
+def test_gradient_penalty_of_a_linear_and_a_quadratic_function() -> None:
+    weight = torch.tensor([1.0, -2.0, 3.0])
+    x = torch.randn(5, 3, requires_grad=True)
+    assert gradient_penalty(x @ weight, x).item() == pytest.approx(14.0)  # ||w||^2 everywhere
+    y = torch.tensor([[1.0, 2.0], [0.0, 3.0]], requires_grad=True)
+    assert gradient_penalty(y.square().sum(1), y).item() == pytest.approx((4 * 5 + 4 * 9) / 2)  # E ||2 y||^2
+
+
+def test_gradient_penalty_can_be_differentiated() -> None:
+    weight = torch.tensor([1.0, -2.0, 3.0], requires_grad=True)
+    x = torch.ones(5, 3, requires_grad=True)
+    gradient_penalty(x @ weight, x).backward()
+    assert weight.grad is not None
+    assert weight.grad.tolist() == [2.0, -4.0, 6.0]  # d ||w||^2 / dw
+
+
+def test_gradient_penalty_is_on_the_normalised_input(generator: torch.Generator) -> None:
+    discriminator = make(generator)
+    windows = torch.randn(50, 2, 3, generator=generator)
+    scales = torch.tensor([1.0, 100.0, 1e4])
+    penalties = []
+    for scale in (torch.ones(3), scales):  # the same data in other units
+        discriminator.normalizer = type(discriminator.normalizer)((3,))
+        discriminator.normalizer.update(windows * scale)
+        sample = Windows(windows * scale)
+        penalties.append(discriminator_loss(discriminator, sample, sample, sample).parts["gradient_penalty"].item())
+    assert penalties[0] > 0
+    assert penalties[0] == pytest.approx(penalties[1], rel=1e-3)
+
+
+def test_parts_of_the_loss_by_hand(generator: torch.Generator) -> None:
+    discriminator = make(generator)
+    with torch.no_grad():  # a network that answers its bias, whatever the window
+        for layer in discriminator.trunk:
+            if isinstance(layer, nn.Linear):
+                layer.weight.fill_(0.0)
+                layer.bias.fill_(0.0)
+        discriminator.head.weight.fill_(0.5)
+        discriminator.head.bias.fill_(math.log(3.0))  # D = 3/4
+    sample = Windows(torch.randn(6, 2, 3, generator=generator))
+    loss = discriminator_loss(discriminator, sample, Windows(sample.window[:2]), sample)
+    parts = {name: part.item() for name, part in loss.parts.items()}
+    assert parts["agent"] + parts["replay"] == pytest.approx(0.5 * math.log(4))  # -log(1 - 3/4)
+    assert parts["agent"] == pytest.approx(3 * parts["replay"])  # each window counts alike
+    assert parts["demonstration"] == pytest.approx(0.5 * math.log(4 / 3))
+    assert parts["gradient_penalty"] == 0
+    assert parts["logit_decay"] == pytest.approx(0.01 * 4 * 0.25)
+    assert parts["weight_decay"] == pytest.approx(1e-4 * 4 * 0.25)
+    assert loss.scores["agent_score"].item() == pytest.approx(0.75)
+    assert loss.scores["demonstration_accuracy"].item() == 1.0
+    assert loss.scores["agent_accuracy"].item() == 0.0
+
+
+def test_style_reward() -> None:
+    reward = style_reward(torch.tensor([0.0, 100.0, -100.0]))
+    assert reward.tolist() == pytest.approx([math.log(2), -math.log(1e-4), 0.0], abs=1e-6)
+    assert style_reward(torch.tensor(0.0), scale=2.0).item() == pytest.approx(2 * math.log(2))
+
+
+def test_it_learns_to_tell_two_clouds_apart(generator: torch.Generator) -> None:
+    discriminator = make(generator, hidden=(32, 32))
+    optimizer = torch.optim.Adam(discriminator.parameters(), lr=3e-3)
+    for _ in range(150):
+        agent = torch.randn(64, 2, 3, generator=generator) - 1
+        demonstration = torch.randn(64, 2, 3, generator=generator) + 1
+        loss = discriminator_loss(discriminator, Windows(agent), Windows(agent), Windows(demonstration))
+        optimizer.zero_grad()
+        torch.stack(list(loss.parts.values())).sum().backward()
+        optimizer.step()
+    assert loss.scores["agent_accuracy"] > 0.9
+    assert loss.scores["demonstration_accuracy"] > 0.9
+    assert loss.scores["agent_score"] < 0.3 < 0.7 < loss.scores["demonstration_score"]
+
+
+class Beside(Condition):
+    """The condition stands beside the window, as CALM's latent."""
+
+    inputs = 2
+
+    def join(self, x: Tensor, condition: Tensor | None) -> Tensor:
+        assert condition is not None
+        return torch.cat([x, condition], -1)
+
+
+class Column(Condition):
+    """The condition picks an output, as C·ASE's label."""
+
+    outputs = 3
+
+    def pick(self, logits: Tensor, condition: Tensor | None) -> Tensor:
+        assert condition is not None
+        return logits.gather(1, condition[:, None])[:, 0]
+
+
+@pytest.mark.parametrize(
+    ("strategy", "told"),
+    [(Beside(), torch.eye(2)[[0, 1, 0, 1, 1]]), (Column(), torch.tensor([0, 1, 2, 1, 0]))],
+    ids=["beside", "column"],
+)
+def test_a_condition_plugs_in_without_a_new_loss(strategy: Condition, told: Tensor, generator: torch.Generator) -> None:
+    discriminator = make(generator, strategy)
+    window = torch.randn(1, 2, 3, generator=generator).expand(5, 2, 3)
+    logits = discriminator.logits(window, told)
+    assert logits.shape == (5,)
+    assert logits[0] != logits[1]  # the same window, judged by another condition
+    assert logits[1] == logits[3]
+    sample = Windows(window, told)
+    parts = discriminator_loss(discriminator, sample, sample, sample).parts
+    torch.stack(list(parts.values())).sum().backward()
+    assert all(parameter.grad is not None for parameter in discriminator.parameters())

@@ -1,0 +1,48 @@
+import pytest
+import torch
+
+from murmillo.agents.common.errors import AgentError
+from murmillo.agents.common.networks import GaussianPolicy, linear, mlp
+
+
+def policy(seed: int = 0, **changes: object) -> GaussianPolicy:
+    return GaussianPolicy(5, 3, (16, 8), 0.05, torch.Generator().manual_seed(seed), condition_dim=4, **changes)  # type: ignore
+
+
+def test_weights_come_from_the_generator_alone() -> None:
+    torch.manual_seed(1)
+    first = policy().state_dict()
+    torch.manual_seed(2)
+    second = policy().state_dict()
+    assert all(torch.equal(first[name], second[name]) for name in first)
+    assert not torch.equal(first["head.weight"], policy(seed=1).state_dict()["head.weight"])
+
+
+def test_initial_weights_and_biases(generator: torch.Generator) -> None:
+    layer = linear(100, 200, generator)
+    assert 0.099 < layer.weight.abs().max() <= 0.1  # 1 / sqrt(100)
+    assert layer.bias.abs().max() == 0
+    assert 0.99 < linear(100, 200, generator, bound=1.0).weight.abs().max() <= 1
+
+
+def test_layers_end_in_a_rectifier(generator: torch.Generator) -> None:
+    assert mlp([3, 7, 6], generator)(torch.randn(50, 3)).min() == 0
+
+
+def test_shapes_std_and_scale(generator: torch.Generator) -> None:
+    state, latent = torch.randn(6, 7, 5, generator=generator), torch.randn(6, 7, 4, generator=generator)
+    mean = policy()(state, latent)
+    assert mean.shape == (6, 7, 3)
+    torch.testing.assert_close(policy().log_std.exp(), torch.full((3,), 0.05))
+    torch.testing.assert_close(policy(mean_init_scale=0.01)(state, latent), 0.01 * mean)
+
+
+def test_the_style_network_answers_within_its_tanh(generator: torch.Generator) -> None:
+    style = policy(style_hidden=(8,)).style(100 * torch.randn(20, 4, generator=generator))
+    assert style.shape == (20, 4)
+    assert style.abs().max() <= 1
+
+
+def test_no_standard_deviation_is_refused(generator: torch.Generator) -> None:
+    with pytest.raises(AgentError, match=r"ppo\.std"):
+        GaussianPolicy(5, 3, (8,), 0.0, generator)

@@ -1,0 +1,97 @@
+from typing import Any
+
+import torch
+
+from murmillo.agents.common.losses import action_bound_loss
+from murmillo.agents.common.ppo import PPO, ActorCritic, PPOConfig
+from murmillo.agents.common.rollout import Rollout
+
+
+def make(**changes: Any) -> PPO:
+    rates = {"policy_learning_rate": 1e-2, "value_learning_rate": 1e-2}
+    config = PPOConfig(**{"hidden": (16,), "std": 0.2, "minibatch": 20, **rates, **changes})
+    return PPO(ActorCritic(3, 2, 0, config, torch.Generator().manual_seed(0)), config)
+
+
+def rollout(ppo: PPO, generator: torch.Generator) -> Rollout:
+    """50 samples whose first action should grow."""
+    batch = Rollout(5, 10)
+    for t in range(5):
+        state = 7 + torch.randn(10, 3, generator=generator)
+        action, log_prob = ppo.model.act(state, None, generator)
+        batch.store(t, {"state": state, "action": action, "log_prob": log_prob})
+    batch["advantage"] = batch["action"][..., 0].clone()
+    batch["return"] = 100 + 10 * batch["state"][..., 1]
+    return batch
+
+
+def mean_action(ppo: PPO) -> torch.Tensor:
+    state = torch.full((1, 3), 7.0)
+    return ppo.model.act(state, None, torch.Generator(), deterministic=True)[0][0]
+
+
+def test_it_moves_towards_what_was_better_and_learns_the_return(generator: torch.Generator) -> None:
+    ppo = make()
+    errors = []
+    before = mean_action(ppo)
+    for _ in range(20):
+        batch = rollout(ppo, generator)
+        errors.append((ppo.model.value(batch["state"], None) - batch["return"]).square().mean().item())
+        ppo.update(batch, generator)
+    assert mean_action(ppo)[0] > before[0] + 0.3
+    assert errors[-1] < 0.2 * batch["return"].var()
+
+
+def test_means_beyond_the_bound_come_back(generator: torch.Generator) -> None:
+    ppo = make()
+    with torch.no_grad():
+        ppo.model.policy.head.bias.fill_(2.0)
+    for _ in range(10):
+        batch = rollout(ppo, generator)
+        batch["advantage"] = torch.zeros(5, 10)
+        stats = ppo.update(batch, generator)
+    assert stats["bound"] < 0.1
+    assert action_bound_loss(mean_action(ppo)) < 0.05
+
+
+def test_normalisers_learn_once_and_only_after_the_update(generator: torch.Generator) -> None:
+    ppo = make(epochs=3)
+    batch = rollout(ppo, generator)
+    stats = ppo.update(batch, generator)
+    assert ppo.model.state_normalizer.count == 50
+    torch.testing.assert_close(ppo.model.return_normalizer.mean, batch["return"].double().mean())
+    # the first pass met the statistics that the actions were drawn with, so that its ratios began at 1
+    fresh = make(epochs=1, policy_learning_rate=0.0)
+    batch = rollout(fresh, generator)
+    assert fresh.update(batch, generator)["kl"] < 1e-6 < stats["kl"]
+
+
+def test_too_large_a_step_ends_the_passes() -> None:
+    weights = []
+    for changes in ({"epochs": 5, "target_kl": 0.0}, {"epochs": 1}, {"epochs": 5}):
+        generator = torch.Generator().manual_seed(3)
+        ppo = make(**changes)
+        ppo.update(rollout(ppo, generator), generator)
+        weights.append(ppo.model.policy.head.weight)
+    assert torch.equal(weights[0], weights[1])
+    assert not torch.equal(weights[0], weights[2])
+
+
+def test_a_further_loss_and_a_condition_reach_the_networks(generator: torch.Generator) -> None:
+    config = PPOConfig(hidden=(8,), style_hidden=(8,), minibatch=20, epochs=1)
+    ppo = PPO(ActorCritic(3, 2, 4, config, generator), config)
+    batch = Rollout(5, 10)
+    for t in range(5):
+        state, label = torch.randn(10, 3, generator=generator), torch.randn(10, 4, generator=generator)
+        action, log_prob = ppo.model.act(state, label, generator)
+        batch.store(t, {"state": state, "label": label, "action": action, "log_prob": log_prob})
+    batch["advantage"] = batch["return"] = torch.randn(5, 10, generator=generator)
+    stats = ppo.update(
+        batch,
+        generator,
+        fields=("label",),
+        condition=lambda rows: rows["label"],
+        extra_loss=lambda rows, mean: {"pull": (mean - rows["label"][:, :2]).square().mean()},
+    )
+    assert stats["pull"] > 0
+    assert all(parameter.grad is not None for parameter in ppo.model.parameters())

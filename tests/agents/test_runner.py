@@ -1,0 +1,144 @@
+from pathlib import Path
+
+import pytest
+import torch
+from gymnasium.vector import AutoresetMode
+
+from murmillo.agents.common import checkpoint
+from murmillo.agents.common.episodes import EpisodeStatistics
+from murmillo.agents.common.errors import AgentError
+from murmillo.agents.common.logger import Logger
+from tests.agents.toy import PointMass, equal, make_runner
+
+ITERATION = 32 * 8
+
+
+def test_n_and_n_more_are_2n_bit_for_bit(tmp_path: Path) -> None:
+    straight: list[dict[str, float]] = []
+    whole = make_runner(tmp_path / "whole", samples=6 * ITERATION)
+    whole.on_iteration = [straight.append]
+    whole.run()
+
+    halves: list[dict[str, float]] = []
+    first = make_runner(tmp_path / "half", samples=3 * ITERATION)
+    first.on_iteration = [halves.append]
+    first.run()
+    second = make_runner(tmp_path / "half", samples=6 * ITERATION, seed=77)
+    second.on_iteration = [halves.append]
+    second.load(tmp_path / "half")
+    second.run()
+
+    for one, other in zip(straight, halves, strict=True):
+        assert {**one, "samples_per_second": 0.0} == pytest.approx(
+            {**other, "samples_per_second": 0.0}, rel=0, abs=0, nan_ok=True
+        )
+    assert equal(checkpoint.load(tmp_path / "whole"), checkpoint.load(tmp_path / "half"))
+
+
+def test_another_seed_is_another_run(tmp_path: Path) -> None:
+    for seed in (0, 1):
+        make_runner(tmp_path / str(seed), samples=ITERATION, seed=seed).run()
+    assert not equal(checkpoint.load(tmp_path / "0"), checkpoint.load(tmp_path / "1"))
+
+
+def test_the_successor_in_the_rollout_is_the_true_one(tmp_path: Path) -> None:
+    runner = make_runner(tmp_path, horizon=40, agent={"latent_steps": (150, 150)})
+    rollout = runner._collect()
+    done = rollout["terminated"] | rollout["truncated"]
+    assert done.any()
+    # no step moves further than the speed allows, also where an episode ended; the window ends with the successor
+    assert (rollout["next_state"] - rollout["state"])[..., :2].abs().max() <= 0.1 + 1e-6
+    assert torch.equal(rollout["next_window"][..., -1, :], rollout["next_state"])
+    # and only a new episode brings a new latent before its time
+    assert torch.equal((rollout["latent"][:-1] == rollout["latent"][1:]).all(-1), ~done[:-1])
+    follows = rollout["next_state"][:-1] == rollout["state"][1:]
+    assert torch.equal(follows.all(-1), ~done[:-1])
+
+
+def test_stop_ends_after_the_iteration_and_saves(tmp_path: Path) -> None:
+    runner = make_runner(tmp_path / "c", samples=10**9)
+    runner.on_iteration = [lambda stats: runner.stop() if stats["iteration"] == 2 else None]
+    runner.run()
+    assert checkpoint.load(tmp_path / "c")["iteration"] == 2
+
+
+def test_minutes_end_a_run(tmp_path: Path) -> None:
+    runner = make_runner(tmp_path / "c", samples=10**9, max_minutes=0.01)
+    runner.run()
+    assert runner.iteration >= 1
+
+
+def test_named_rewards_are_weighted_and_logged(tmp_path: Path) -> None:
+    runner = make_runner(tmp_path, reward_weights={"task": 2.0, "style": 1.0, "skill": 0.5})
+    rollout = runner._collect()
+    means = runner._reward(rollout)
+    total = 2 * means["reward/task"] + means["reward/style"] + 0.5 * means["reward/skill"]
+    assert means["reward/total"] == pytest.approx(total, rel=1e-5)
+
+
+@pytest.mark.parametrize("weights", [{"style": 1.0}, {"style": 1.0, "skill": 0.5, "styl": 1.0}])
+def test_weights_and_terms_must_match(tmp_path: Path, weights: dict[str, float]) -> None:
+    with pytest.raises(AgentError, match="the terms are skill, style, task"):
+        make_runner(tmp_path, reward_weights=weights).run()
+
+
+def test_nan_stops_with_one_line_and_spoils_no_checkpoint(tmp_path: Path) -> None:
+    runner = make_runner(tmp_path / "c", samples=ITERATION)
+    runner.run()
+    runner.config.samples = 2 * ITERATION
+    with torch.no_grad():
+        next(iter(runner.agent.model.policy.parameters())).fill_(torch.nan)  # type: ignore[attr-defined]
+    with pytest.raises(AgentError, match=r"iteration 2: .* is nan") as error:
+        runner.run()
+    assert "\n" not in str(error.value)
+    assert checkpoint.load(tmp_path / "c")["iteration"] == 1
+
+
+def test_a_checkpoint_of_something_else_is_refused(tmp_path: Path) -> None:
+    runner = make_runner(tmp_path / "c", samples=1)
+    runner.meta = {"character": "toy"}
+    runner.run()
+    other = make_runner(tmp_path / "c", samples=1)
+    other.meta = {"character": "humanoid"}
+    with pytest.raises(AgentError, match="character is 'toy' there, 'humanoid' here"):
+        other.load(tmp_path / "c")
+
+
+def test_another_autoreset_mode_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    runner = make_runner(tmp_path)
+    env = PointMass(2)
+    env.metadata = {"autoreset_mode": AutoresetMode.NEXT_STEP}
+    with pytest.raises(AgentError, match="SAME_STEP"):
+        type(runner)(env, runner.agent, runner.config, runner.generator, tmp_path)
+
+
+def test_one_world_and_odd_sizes(tmp_path: Path) -> None:
+    make_runner(tmp_path / "c", num_envs=1, horizon=131, samples=2 * 131).run()
+    assert checkpoint.load(tmp_path / "c")["samples"] == 262
+
+
+def test_the_log_of_a_resumed_run_has_every_iteration_once(tmp_path: Path) -> None:
+    for samples, seed in ((2, 0), (4, 1)):
+        runner = make_runner(tmp_path / "c", samples=samples * ITERATION, seed=seed)
+        runner.logger = Logger(tmp_path)
+        if seed:
+            runner.load(tmp_path / "c")
+        runner.run()
+        runner.logger.close()
+    lines = (tmp_path / "scalars.csv").read_text().splitlines()
+    assert [line.split(",")[0] for line in lines] == ["samples", *(str(n * ITERATION) for n in (1, 2, 3, 4))]
+
+
+def test_episode_statistics_by_hand() -> None:
+    episodes = EpisodeStatistics(3)
+    yes, no = True, False
+    for terminated, truncated in (
+        ([no, no, no], [no, no, no]),
+        ([yes, no, no], [no, no, no]),
+        ([yes, no, no], [no, yes, no]),
+    ):
+        end, cut = torch.tensor(terminated), torch.tensor(truncated)
+        episodes.step(end, end | cut)
+    assert episodes.summary() == {"episode/length": 2.0, "episode/fall_rate": pytest.approx(2 / 3)}  # 2, 1 and 3 steps
+    assert episodes.length.tolist() == [0, 0, 3]
+    assert episodes.summary()["episode/length"] != episodes.summary()["episode/length"]  # NaN: none ended

@@ -1,0 +1,140 @@
+"""A vector environment for tests: point masses on a plane, whose demonstrations move straight at one speed."""
+
+from typing import Any
+
+import numpy as np
+import torch
+from gymnasium import spaces
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from torch import Tensor
+
+from murmillo.agents.ase.agent import ASE
+from murmillo.agents.ase.config import ASEConfig
+from murmillo.agents.common.discriminator import DiscriminatorConfig
+from murmillo.agents.common.ppo import PPOConfig
+from murmillo.agents.common.runner import Runner, RunnerConfig
+
+SPEED = 0.6
+DT = 0.1
+
+
+class PointMass(VectorEnv):
+    """State: position and velocity, `[N, 4]`. Action: the velocity to approach, `[N, 2]`.
+
+    Reward: minus the distance of the speed from that of the demonstrations. Terminates far from the origin, truncates
+    after `episode_steps`. `infos["final_obs"]` holds the true successors of all worlds, as arrays.
+    """
+
+    def __init__(self, num_envs: int, window: int = 3, episode_steps: int = 16, bound: float = 1.2) -> None:
+        self.num_envs = num_envs
+        self.window = window
+        self.episode_steps = episode_steps
+        self.bound = bound
+        self.metadata = {"autoreset_mode": AutoresetMode.SAME_STEP}
+        self.single_observation_space = spaces.Dict(
+            {
+                "state": spaces.Box(-np.inf, np.inf, (4,), np.float32),
+                "skill": spaces.Discrete(1),
+                "window": spaces.Box(-np.inf, np.inf, (window, 4), np.float32),
+            }
+        )
+        self.single_action_space = spaces.Box(-1, 1, (2,), np.float32)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self.history = np.zeros((num_envs, window, 4), np.float32)
+        self.clock = np.zeros(num_envs, np.int64)
+        self.rng = torch.Generator()
+
+    def reset(self, *, seed: int | None = None, options: Any = None) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+        if seed is not None:
+            self.rng.manual_seed(seed)
+        self._begin(np.ones(self.num_envs, bool))
+        return self._obs(), {}
+
+    def step(self, actions: np.ndarray) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray, np.ndarray, dict]:
+        state = self.history[:, -1]
+        velocity = 0.5 * state[:, 2:] + 0.5 * np.clip(actions, -1, 1)
+        position = state[:, :2] + DT * velocity
+        self.history = np.concatenate([self.history[:, 1:], np.hstack([position, velocity])[:, None]], 1)
+        self.clock += 1
+        reward = -np.abs(np.linalg.norm(velocity, axis=1) - SPEED)
+        terminated = np.abs(position).max(1) > self.bound
+        truncated = ~terminated & (self.clock >= self.episode_steps)
+        infos = {"final_obs": self._obs()}
+        self._begin(terminated | truncated)
+        return self._obs(), reward, terminated, truncated, infos
+
+    def _begin(self, worlds: np.ndarray) -> None:
+        start = np.zeros((int(worlds.sum()), 4), np.float32)
+        start[:, :2] = torch.rand(len(start), 2, generator=self.rng).numpy() - 0.5
+        self.history[worlds] = start[:, None]
+        self.clock[worlds] = 0
+
+    def _obs(self) -> dict[str, np.ndarray]:
+        window = self.history.copy()
+        return {"state": window[:, -1], "skill": np.zeros(self.num_envs, np.int64), "window": window}
+
+    def demonstrations(self, n: int, generator: torch.Generator, skill: Tensor | None = None) -> dict[str, Tensor]:
+        angle = 2 * torch.pi * torch.rand(n, 1, generator=generator)
+        velocity = SPEED * torch.cat([angle.cos(), angle.sin()], 1)
+        start = torch.rand(n, 2, generator=generator) - 0.5
+        times = DT * torch.arange(self.window)
+        position = start[:, None] + times[None, :, None] * velocity[:, None]
+        window = torch.cat([position, velocity[:, None].expand_as(position)], 2)
+        return {"window": window, "skill": torch.zeros(n, dtype=torch.int64)}
+
+    def imitation_pairs(self, n: int, generator: torch.Generator) -> dict[str, Tensor]:
+        state = self.demonstrations(n, generator)["window"][:, -1]
+        return {"state": state, "action": state[:, 2:]}
+
+    def state_dict(self) -> dict[str, Tensor]:
+        return {
+            "history": torch.from_numpy(self.history.copy()),
+            "clock": torch.from_numpy(self.clock.copy()),
+            "rng": self.rng.get_state(),
+        }
+
+    def load_state_dict(self, state: dict[str, Tensor]) -> None:
+        self.history = state["history"].numpy().copy()
+        self.clock = state["clock"].numpy().copy()
+        self.rng.set_state(state["rng"])
+
+
+def small_ase(**changes: Any) -> ASEConfig:
+    """ASE with networks and steps that fit the toy."""
+    ppo = PPOConfig(
+        hidden=(32, 32),
+        style_hidden=(),
+        std=0.1,
+        policy_learning_rate=1e-3,
+        value_learning_rate=3e-3,
+        epochs=4,
+        minibatch=128,
+    )
+    discriminator = DiscriminatorConfig(
+        hidden=(32, 32), learning_rate=1e-3, minibatch=64, updates=8, gradient_penalty=1.0, replay_size=1000
+    )
+    fields = {"latent_dim": 4, "latent_steps": (1, 32), "window": 3, "ppo": ppo, "discriminator": discriminator}
+    return ASEConfig(**{**fields, **changes})
+
+
+def make_ase(env: PointMass, generator: torch.Generator, **changes: Any) -> ASE:
+    return ASE(env, env.demonstrations, small_ase(**changes), generator)
+
+
+def make_runner(folder: Any, *, num_envs: int = 32, seed: int = 0, agent: dict | None = None, **config: Any) -> Runner:
+    """A runner of small ASE on the toy; `agent` changes the agent's config, the rest the runner's."""
+    generator = torch.Generator().manual_seed(seed)
+    env = PointMass(num_envs)
+    settings = RunnerConfig(**{"samples": 32 * 8 * 4, "horizon": 8, "lam": 0.9, "gamma": 0.9, **config})
+    return Runner(env, make_ase(env, generator, **(agent or {})), settings, generator, folder)
+
+
+def equal(a: object, b: object) -> bool:
+    """Whether two nested states are the same, bit for bit."""
+    if isinstance(a, dict) and isinstance(b, dict):
+        return a.keys() == b.keys() and all(equal(a[key], b[key]) for key in a)
+    if isinstance(a, torch.Tensor) and isinstance(b, torch.Tensor):
+        return a.dtype == b.dtype and torch.equal(a, b)
+    return a == b
