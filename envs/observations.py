@@ -1,5 +1,8 @@
 """The state that every policy and discriminator sees; one function for the simulation and for clips."""
 
+from dataclasses import dataclass
+from functools import lru_cache
+
 import torch
 from torch import Tensor
 
@@ -36,20 +39,47 @@ def character_state(character: Character, qpos: Tensor, qvel: Tensor, key_pos_w:
     Returns:
         [..., 120] for the sword-and-shield humanoid.
     """
+    layout = _layout(character)
     root_pos_w, root_quat_w = qpos[..., 0:3], qpos[..., 3:7]
     to_heading = quat_conj(heading_quat(root_quat_w))
     root_quat_h = quat_mul(to_heading, root_quat_w)
-    joints = [
-        tan_norm(qpos[..., joint.qpos]) if joint.kind == "ball" else qpos[..., joint.qpos] for joint in character.joints
-    ]
     key_pos_h = quat_rotate(to_heading.unsqueeze(-2), key_pos_w - root_pos_w.unsqueeze(-2))
+    joints = qpos.new_empty(*qpos.shape[:-1], layout.width)
+    joints[..., layout.ball_columns] = tan_norm(qpos[..., layout.ball_qpos])
+    joints[..., layout.hinge_columns] = qpos[..., layout.hinge_qpos]
     parts = [
         root_pos_w[..., 2:3],
         tan_norm(root_quat_h),
         quat_rotate(to_heading, qvel[..., 0:3]),
         quat_rotate(root_quat_h, qvel[..., 3:6]),
-        *joints,
+        joints,
         qvel[..., 6:],
         key_pos_h.flatten(-2),
     ]
     return torch.cat(parts, dim=-1).float()
+
+
+@dataclass(frozen=True)
+class _Layout:
+    """Where the joints lie: `*_qpos` in qpos, `*_columns` among the `width` columns of joint rotations."""
+
+    width: int
+    ball_qpos: Tensor
+    ball_columns: Tensor
+    hinge_qpos: Tensor
+    hinge_columns: Tensor
+
+
+@lru_cache(maxsize=8)
+def _layout(character: Character) -> _Layout:
+    column, ball, hinge = 0, [], []
+    for joint in character.joints:
+        if joint.kind == "ball":
+            ball.append((range(joint.qpos.start, joint.qpos.stop), range(column, column + 6)))
+            column += 6
+        else:
+            hinge.append((joint.qpos.start, column))
+            column += 1
+    ball_qpos, ball_columns = (torch.tensor([list(pair[i]) for pair in ball]) for i in (0, 1))
+    hinge_qpos, hinge_columns = torch.tensor(hinge).unbind(-1)
+    return _Layout(column, ball_qpos, ball_columns, hinge_qpos, hinge_columns)

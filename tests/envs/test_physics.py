@@ -8,6 +8,7 @@ import torch
 from murmillo.envs.character import Character, load_character
 from murmillo.envs.errors import SuiteError
 from murmillo.envs.physics import make_physics
+from murmillo.envs.physics.cpu import CpuPhysics
 from murmillo.envs.residual import ResidualForces
 
 
@@ -90,7 +91,7 @@ def test_a_diverged_world_is_healed_alone_and_reported(character):
 
 def test_a_force_at_a_joint_brings_its_moment_about_the_centre_of_mass(character):
     """A force at the body origin accelerates the body as MuJoCo's mj_applyFT at that point does."""
-    physics = make_physics(character, 1)
+    physics = CpuPhysics(character, 1)
     force = torch.zeros(1, 17, 3)
     arm = character.bodies.index("left_lower_arm")
     force[0, arm] = torch.tensor([20.0, -10.0, 5.0])

@@ -1,0 +1,39 @@
+# Plain verbs. Each sets up .venv first, once: only Python 3 and its venv module are needed.
+PYTHON ?= python3
+BIN := .venv/bin
+INSTALLED := .venv/.installed
+
+.DEFAULT_GOAL := help
+.PHONY: help train test lint type bench wheel clean
+
+help:  ## list the verbs
+	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-8s %s\n", $$1, $$2}' Makefile
+
+$(INSTALLED): pyproject.toml constraints.txt
+	test -x $(BIN)/python || $(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --disable-pip-version-check --quiet -c constraints.txt -e '.[dev]'
+	touch $@
+
+train: $(INSTALLED)  ## train ASE on the built-in clips for about 8 minutes; ARGS="seed=2" adds settings
+	$(BIN)/murmillo train $(ARGS)
+
+test: $(INSTALLED)  ## run the tests; ARGS="-k rotations" adds pytest's options
+	$(BIN)/python -m pytest $(ARGS)
+
+lint: $(INSTALLED)  ## ruff and the import contracts
+	$(BIN)/ruff check .
+	$(BIN)/lint-imports --no-cache
+
+type: $(INSTALLED)  ## pyright
+	$(BIN)/pyright
+
+bench: $(INSTALLED)  ## run the benchmarks side by side
+	$(BIN)/python -m pytest benchmarks --benchmark-only $(ARGS)
+
+wheel: $(INSTALLED)  ## build dist/*.whl
+	rm -rf build dist
+	$(BIN)/python -m build --wheel --no-isolation
+
+clean:  ## remove what the other verbs made, except runs/
+	rm -rf .venv build dist *.egg-info .pytest_cache .ruff_cache .hypothesis .benchmarks
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,64 @@
+"""Combinations of settings that cannot be, refused before anything is made."""
+
+from murmillo.cli.config import TrainConfig
+from murmillo.cli.errors import CommandError
+from murmillo.envs.character import CONTROL_DT, load_character
+from murmillo.envs.motion import load_clips
+
+
+def check_settings(config: TrainConfig) -> None:
+    """Refuse what can be seen from the settings alone.
+
+    Raises:
+        CommandError: naming the key, what was wrong and what would be right.
+    """
+    for name, value in (
+        ("num_envs", config.num_envs),
+        ("runner.horizon", config.runner.horizon),
+        ("runner.samples", config.runner.samples),
+        ("agent.window", config.agent.window),
+        ("agent.ppo.minibatch", config.agent.ppo.minibatch),
+        ("agent.discriminator.minibatch", config.agent.discriminator.minibatch),
+        ("run.measured_worlds", config.run.measured_worlds),
+    ):
+        if value < 1:
+            raise CommandError(f"{name}={value}: needs at least 1")
+    if config.threads < 0:
+        raise CommandError(f"threads={config.threads}: needs a number of threads, or 0 for every core")
+    batch = config.num_envs * config.runner.horizon
+    if config.agent.ppo.minibatch > batch:
+        raise CommandError(
+            f"agent.ppo.minibatch={config.agent.ppo.minibatch}: larger than the {batch} samples of an iteration "
+            f"(num_envs {config.num_envs} x runner.horizon {config.runner.horizon}); needs at most {batch}"
+        )
+    if config.env.window != config.agent.window:
+        raise CommandError(
+            f"env.window={config.env.window}: the agent sees agent.window={config.agent.window} frames; "
+            "set agent.window alone"
+        )
+    if config.env.autoreset != "same_step":
+        raise CommandError(f"env.autoreset={config.env.autoreset}: training needs same_step")
+
+
+def check_clips(config: TrainConfig) -> None:
+    """Refuse what the clips do not allow.
+
+    Raises:
+        CommandError: the window is longer than every clip, or the clips have another number of labels.
+        MotionError: the clips cannot be used.
+    """
+    clips = load_clips(config.env.motions, load_character(config.env.character))
+    longest = max(clip.duration for clip in clips)
+    span = (config.agent.window - 1) * CONTROL_DT
+    if span > longest + 1e-6:
+        most = int(longest / CONTROL_DT + 1e-6) + 1
+        raise CommandError(
+            f"agent.window={config.agent.window}: {span:.2f} s are longer than every clip of "
+            f"motions={config.env.motions} (the longest has {longest:.2f} s); needs at most {most}"
+        )
+    labels = sorted({clip.label for clip in clips})
+    if config.skills is not None and config.skills != len(labels):
+        raise CommandError(
+            f"skills={config.skills}: the clips of motions={config.env.motions} have {len(labels)} labels "
+            f"({', '.join(labels[:8])}{', …' if len(labels) > 8 else ''}); set skills={len(labels)} or null"
+        )

@@ -1,0 +1,199 @@
+"""The settings of `murmillo train`: hydra puts them together from `conf/`, the dataclasses of the rooms check them."""
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, TypeVar
+
+from hydra import compose, initialize_config_module
+from hydra.core.config_store import ConfigStore
+from hydra.errors import HydraException
+from omegaconf import DictConfig, OmegaConf, open_dict
+from omegaconf.errors import OmegaConfBaseException
+from yaml import YAMLError
+
+from murmillo.agents.common.runner import RunnerConfig
+from murmillo.agents.common.warm_start import WarmStartConfig
+from murmillo.cli import runs
+from murmillo.cli.agents import AGENTS
+from murmillo.cli.errors import CommandError
+from murmillo.cli.schema import build, schema_of
+from murmillo.cli.translate import command_error, wrong_name
+from murmillo.envs import EnvConfig
+
+GROUPS = ("agent", "budget", "ablation")
+RESUMABLE = ("run.", "runner.", "threads=")
+"""What may be set anew when a run is taken up again; everything else is the run's own."""
+
+T = TypeVar("T")
+
+
+@dataclass
+class RunConfig:
+    """Where a run is kept.
+
+    Attributes:
+        root: folder of the runs.
+        name: the run's folder in it; by default the time, the agent, the budget and the seed.
+        resume: folder of a run to take up again, with its own settings.
+        measured_worlds: episodes that the policy is measured in at the end.
+        video: film the trained character at the end.
+    """
+
+    root: str = "runs"
+    name: str | None = None
+    resume: str | None = None
+    measured_worlds: int = 64
+    video: bool = True
+
+
+@dataclass
+class TrainConfig:
+    """All settings of a run.
+
+    Attributes:
+        agent: the chosen agent's configuration.
+        choices: the files of `conf/` that this was put together from, by group.
+        motions: "builtin", a folder of clips or one file.
+        skills: how many labels the clips must have; None takes what they have.
+        num_envs: worlds that are simulated together.
+        seed: of everything random.
+        threads: CPU threads; 0 takes every core that the process may use.
+    """
+
+    agent: Any
+    env: EnvConfig = field(default_factory=EnvConfig)
+    runner: RunnerConfig = field(default_factory=RunnerConfig)
+    warm_start: WarmStartConfig = field(default_factory=WarmStartConfig)
+    run: RunConfig = field(default_factory=RunConfig)
+    choices: dict[str, str] = field(default_factory=dict)
+    motions: str = "builtin"
+    skills: int | None = None
+    num_envs: int = 4096
+    seed: int = 1
+    threads: int = 0
+
+
+def register() -> None:
+    """Tell hydra the schemas which the files of `conf/` are checked against."""
+    store = ConfigStore.instance()
+    store.store(name="train_schema", node=schema_of(TrainConfig))
+    for name, kind in AGENTS.items():
+        store.store(group="agent", name=f"{name}_schema", node=schema_of(kind.config))
+
+
+def compose_train(words: list[str]) -> TrainConfig:
+    """The settings that these words of the command line ask for.
+
+    Raises:
+        CommandError: a word that cannot be, in one line with what would be right.
+    """
+    _check_words(words)
+    resumed = [word.split("=", 1)[1] for word in words if word.startswith("run.resume=")]
+    if resumed and resumed[-1] not in ("null", ""):
+        return _compose_resumed(resumed[-1], words)
+    composed, choices = _compose(words)
+    return typed(composed, choices)
+
+
+def typed(composed: DictConfig, choices: Mapping[str, Any]) -> TrainConfig:
+    """The dataclasses of a composed configuration; `choices` are hydra's, by group."""
+    try:
+        values: Any = OmegaConf.to_container(composed, resolve=True, throw_on_missing=True, enum_to_str=True)
+    except OmegaConfBaseException as error:
+        raise command_error(error, composed) from None
+    chosen = {group: str(choices[group]) for group in GROUPS if group in choices}
+    values["agent"] = build(AGENTS[chosen["agent"]].config, values["agent"], "agent.")
+    return build(TrainConfig, {**values, "choices": chosen})
+
+
+def save(config: TrainConfig, folder: Path) -> None:
+    """Write `config.yaml`: every setting, resolved."""
+    runs.write_text(folder / runs.CONFIG, OmegaConf.to_yaml(OmegaConf.create(dataclasses.asdict(config))))
+
+
+def load(folder: Path, words: list[str] | None = None) -> TrainConfig:
+    """The settings of a run, with those of `words` (name=value) laid over them.
+
+    Raises:
+        CommandError: the file is no configuration of this version.
+    """
+    try:
+        saved = OmegaConf.load(folder / runs.CONFIG)
+        choices = saved.pop("choices", {})  # type: ignore[union-attr]
+        composed, _ = _compose([f"agent={choices.get('agent', 'ase')}"])
+        return typed(_merge(composed, saved, words or []), choices)
+    except CommandError as error:
+        raise CommandError(f"{folder / runs.CONFIG}: {error}") from None
+    except (OSError, ValueError, YAMLError) as error:
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise CommandError(f"{folder / runs.CONFIG}: no configuration that can be read ({reason})") from None
+
+
+def parse(cls: type[T], words: list[str]) -> T:
+    """The dataclass of a command that has few settings, from words name=value.
+
+    Raises:
+        CommandError: a word that cannot be, in one line with what would be right.
+    """
+    known = OmegaConf.structured(schema_of(cls))
+    names = [f.name for f in dataclasses.fields(cls)]  # type: ignore[arg-type]
+    for word in words:
+        name, equals, _ = word.partition("=")
+        if not equals:
+            raise CommandError(f"{word}: settings are written name=value, with the names {', '.join(names)}")
+        if name not in names:
+            raise wrong_name(name, names)
+    values = _merge(known, OmegaConf.create(), words)
+    missing = sorted(OmegaConf.missing_keys(values))
+    if missing:
+        raise CommandError(f"{missing[0]}: this setting is needed; write {missing[0]}=…")
+    return build(cls, OmegaConf.to_container(values, enum_to_str=True))  # type: ignore[arg-type]
+
+
+def _compose(words: list[str]) -> tuple[DictConfig, Mapping[str, Any]]:
+    """Hydra's configuration of these words, and its choices by group."""
+    register()
+    with initialize_config_module("murmillo.conf", version_base="1.3"):
+        try:
+            composed = compose("config", words, return_hydra_config=True)
+        except (HydraException, OmegaConfBaseException, ValueError) as error:
+            raise command_error(error, compose("config")) from None
+    choices = composed.hydra.runtime.choices
+    with open_dict(composed):
+        del composed["hydra"]
+    return composed, choices
+
+
+def _compose_resumed(path: str, words: list[str]) -> TrainConfig:
+    folder = runs.existing(path, "run.resume")
+    for word in words:
+        if not word.startswith(RESUMABLE):
+            raise CommandError(
+                f"{word}: a run is taken up again with its own settings, but for runner.*, run.* and threads; "
+                "drop this one, or start a new run"
+            )
+    config = load(folder, words)
+    config.run.root, config.run.name = str(folder.parent), folder.name
+    return config
+
+
+def _merge(known: DictConfig, saved: Any, words: list[str]) -> DictConfig:
+    OmegaConf.set_struct(known, None)  # hydra locks dicts too, where new names are fine
+    try:
+        merged = OmegaConf.merge(known, saved, OmegaConf.from_dotlist(words))
+    except OmegaConfBaseException as error:
+        raise command_error(error, known) from None
+    assert isinstance(merged, DictConfig)
+    return merged
+
+
+def _check_words(words: list[str]) -> None:
+    """Refuse what hydra would misread, and its `~name`, which takes a setting away."""
+    for word in words:
+        plain = word.lstrip("+")
+        if plain.startswith("~"):
+            raise CommandError(f"{word}: settings can be changed, not taken away; write name=value")
+        if not plain.partition("=")[0] or "=" not in plain:
+            raise CommandError(f"{word}: settings are written name=value; `murmillo train --help` names the first ones")

@@ -1,0 +1,49 @@
+"""The command `murmillo`: chooses the subcommand and turns a user's mistake into one line and exit status 2."""
+
+import importlib
+import sys
+
+from murmillo.cli.errors import CommandError, near_names, user_errors
+
+HELP = """\
+murmillo: simulated sword-and-shield fighters that learn skills from motion clips
+
+  murmillo train      train an agent and leave a report, a video and checkpoints in runs/<name>/
+  murmillo evaluate   measure a trained agent:       murmillo evaluate run=runs/<name>
+  murmillo record     film a trained agent:          murmillo record run=runs/<name>
+  murmillo doctor     look at this machine: versions, graphics, threads, GPU, speed
+
+`murmillo <command> --help` says what a command takes. Settings are written name=value.
+"""
+
+COMMANDS = ("train", "evaluate", "record", "doctor")
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run one command and return its exit status: 0 done, 2 for a mistake that the user can mend, 130 broken off."""
+    words = sys.argv[1:] if argv is None else argv
+    if not words or words[0] in ("--help", "-h", "help"):
+        print(HELP, end="")
+        return 0
+    try:
+        return _run(words[0], words[1:])
+    except KeyboardInterrupt:
+        print("murmillo: broken off", file=sys.stderr)
+        return 130
+    except user_errors() as error:
+        print(f"murmillo: {error}", file=sys.stderr)
+        return 2
+
+
+def _run(name: str, words: list[str]) -> int:
+    if name not in COMMANDS:
+        raise CommandError(f"there is no command {name!r}; {near_names(name, list(COMMANDS))}")
+    module = importlib.import_module(f"murmillo.cli.{name}")
+    if "--help" in words or "-h" in words:
+        print(module.HELP, end="")
+        return 0
+    return module.run(words)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,65 @@
+"""The report's pictures, from the scalars of the log."""
+
+from pathlib import Path
+
+import numpy as np
+
+from murmillo.cli.metrics import AGENT_SCORE, CLIP_SCORE, EPISODE_LENGTH, FALL_RATE, SKILL, STYLE, Metric
+
+Scalars = dict[str, np.ndarray]
+"""Columns of the log by name, each [iterations]; NaN where an iteration has no value."""
+
+_PANELS: tuple[tuple[str, tuple[Metric, ...]], ...] = (
+    ("episode_length", (EPISODE_LENGTH,)),
+    ("fall_rate", (FALL_RATE,)),
+    ("rewards", (STYLE, SKILL)),
+    ("discriminator", (AGENT_SCORE, CLIP_SCORE)),
+)
+_COLOURS = ("#1f4e79", "#c8553d")
+
+
+def plot_all(scalars: Scalars, folder: Path) -> list[Path]:
+    """One PNG for each panel that has values, in `folder`; their paths in the panels' order."""
+    folder.mkdir(exist_ok=True)
+    paths = []
+    for name, metrics in _PANELS:
+        shown = [metric for metric in metrics if np.isfinite(scalars.get(metric.scalar, np.array([]))).any()]
+        if shown:
+            paths.append(_plot(scalars, shown, folder / f"{name}.png"))
+    return paths
+
+
+def _plot(scalars: Scalars, metrics: list[Metric], path: Path) -> Path:
+    # the object interface: pyplot would open the user's screen back end
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(6.4, 3.2), dpi=120, layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.add_subplot()
+    minutes = scalars["seconds"] / 60.0
+    for metric, colour in zip(metrics, _COLOURS, strict=False):
+        values = scalars[metric.scalar]
+        axes.plot(minutes, values, color=colour, alpha=0.25, linewidth=1.0)
+        axes.plot(minutes, smooth(values), color=colour, linewidth=2.0, label=metric.title)
+    unit = metrics[0].unit
+    axes.set_xlabel("training time [min]")
+    axes.set_ylabel(f"{metrics[0].title} [{unit}]" if len(metrics) == 1 and unit else metrics[0].title)
+    if len(metrics) > 1:
+        axes.set_ylabel("probability" if metrics[0] is AGENT_SCORE else "reward")
+        axes.legend(frameon=False)
+    axes.set_ylim(bottom=0.0)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.grid(axis="y", alpha=0.3)
+    figure.savefig(path)
+    return path
+
+
+def smooth(values: np.ndarray, share: float = 0.05) -> np.ndarray:
+    """Running mean over `share` of the iterations, without the missing ones; as long as `values`."""
+    width = max(1, round(share * len(values)))
+    kernel = np.ones(width)
+    known = np.isfinite(values)
+    total = np.convolve(np.where(known, values, 0.0), kernel, mode="same")
+    count = np.convolve(known.astype(float), kernel, mode="same")
+    return np.divide(total, count, out=np.full(len(values), np.nan), where=count > 0)

@@ -1,0 +1,110 @@
+"""`murmillo record`: film a trained agent without a screen."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from murmillo.cli import gl
+from murmillo.cli.errors import CommandError
+
+HELP = """\
+murmillo record: film a trained agent
+
+  murmillo record run=runs/<name>                    ten seconds, as video.mp4 in the run's folder
+
+  run       needed           folder of the run
+  seconds   10               length of the film
+  skill     by chance        name of the commanded skill
+  camera    track            track, side or front
+  out       video.mp4        file, in the run's folder unless it is a path
+  seed      1                of the start
+  motions   the run's own    a folder or file, where the clips have moved
+
+Works without a screen, through EGL or OSMesa; `murmillo doctor` says whether this machine has one of them.
+"""
+
+
+@dataclass
+class RecordConfig:
+    """What `murmillo record` takes; see `HELP`."""
+
+    run: str
+    seconds: float = 10.0
+    skill: str | None = None
+    camera: str = "track"
+    out: str = "video.mp4"
+    seed: int = 1
+    motions: str | None = None
+
+
+def run(words: list[str]) -> int:
+    """Film the run's last checkpoint."""
+    # MuJoCo reads its choice when it is imported, so nothing that imports it may come before this line
+    backend = gl.choose()
+    from murmillo.cli import config as configuration
+    from murmillo.cli import runs
+
+    settings = configuration.parse(RecordConfig, words)
+    if settings.seconds <= 0:
+        raise CommandError(f"seconds={settings.seconds:g}: needs more than 0")
+    folder = runs.existing(settings.run, "run")
+    out = Path(settings.out) if Path(settings.out).parent != Path() else folder / settings.out
+    if out.suffix != ".mp4" or not out.parent.is_dir():
+        raise CommandError(f"out={settings.out}: needs a file name that ends in .mp4, in a folder that exists")
+    if backend is None:
+        raise CommandError(gl.no_gl_message())
+    print(f"filmed {settings.seconds:g} s: {film(configuration.load(folder), folder, settings, out)}")
+    return 0
+
+
+def film(config: Any, folder: Path, settings: RecordConfig, out: Path) -> Path:
+    """Write the film of one world to `out`, whole or not at all, and return it.
+
+    Raises:
+        SuiteError: nothing can be drawn, or there is no such skill or camera.
+        AgentError: the checkpoint is missing or does not fit.
+    """
+    import dataclasses
+
+    import imageio.v2 as imageio
+    import torch
+
+    from murmillo.agents.common.rollout import tensors
+    from murmillo.cli import runs
+    from murmillo.cli.agents import load_player
+    from murmillo.envs import HumanoidVectorEnv
+
+    motions = settings.motions or config.env.motions
+    shown = dataclasses.replace(config.env, camera=settings.camera, motions=motions, autoreset="same_step", threads=1)
+    env = HumanoidVectorEnv(1, shown, render_mode="rgb_array")
+    beside = out.with_name(f".{out.stem}.part.mp4")
+    try:
+        player = load_player(config.choices["agent"], config.agent, env, config.seed, folder / runs.LAST)
+        obs, _ = env.reset(seed=settings.seed, options={"start": "reference"})
+        _command(env, settings.skill)
+        first = _frame(env)
+        writer: Any = imageio.get_writer(beside, fps=env.metadata["render_fps"], macro_block_size=1)
+        with writer:
+            writer.append_data(first)
+            for _ in range(round(settings.seconds * env.metadata["render_fps"]) - 1):
+                step = player.act(tensors(obs), deterministic=True)
+                obs, _, terminated, truncated, _ = env.step(step.action.numpy())
+                if terminated[0] or truncated[0]:
+                    player.reset(torch.zeros(1, dtype=torch.int64))
+                    _command(env, settings.skill)
+                writer.append_data(_frame(env))
+        beside.replace(out)
+    finally:
+        beside.unlink(missing_ok=True)
+        env.close()
+    return out
+
+
+def _command(env: Any, skill: str | None) -> None:
+    if skill is not None:
+        env.set_skill(skill)
+
+
+def _frame(env: Any) -> Any:
+    frames = env.render()
+    return frames[0]

@@ -1,0 +1,180 @@
+"""`report.md` of a run: what was trained, what came of it, what the figures mean, how to go on."""
+
+import csv
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from omegaconf import OmegaConf
+
+from murmillo.cli import runs
+from murmillo.cli.evaluate import AGES
+from murmillo.cli.metrics import TRAINING, Metric
+from murmillo.cli.plots import Scalars, plot_all
+
+_MAX_ROWS = 12
+
+
+def write(folder: Path) -> Path:
+    """Write the report and its plots from what lies in the run's folder; the report's path."""
+    scalars = read_scalars(folder / runs.SCALARS)
+    config = OmegaConf.load(folder / runs.CONFIG)
+    measures = runs.read_json(folder / runs.MEASURES, {})
+    sections = [
+        f"# {folder.name}",
+        _what(config, runs.read_json(folder / runs.VERSIONS, {}), scalars),
+        _film(folder),
+        _ages(measures),
+    ]
+    if len(scalars["samples"]):
+        plots = plot_all(scalars, folder / runs.PLOTS)
+        sections += [_first_and_last(scalars), _minutes(scalars), _pictures(plots, folder)]
+    sections += [_meanings(), _going_on(folder)]
+    path = folder / runs.REPORT
+    runs.write_text(path, "\n\n".join(section for section in sections if section) + "\n")
+    return path
+
+
+def read_scalars(path: Path) -> Scalars:
+    """Columns of `scalars.csv`, with `seconds` [s] of training since the beginning; no rows where it is missing."""
+    if not path.is_file():
+        return {"samples": np.zeros(0), "seconds": np.zeros(0)}
+    with path.open(newline="", encoding="utf-8") as file:
+        header, *rows = csv.reader(file)
+    table = np.array([[float(cell) if cell else np.nan for cell in row] for row in rows]).reshape(-1, len(header))
+    scalars = dict(zip(header, table.T, strict=True))
+    steps = np.diff(scalars["samples"], prepend=0.0)
+    scalars["seconds"] = np.cumsum(steps / scalars["samples_per_second"])
+    return scalars
+
+
+def _what(config: Any, versions: dict[str, Any], scalars: Scalars) -> str:
+    choices, machine, packages = config.choices, versions.get("machine", {}), versions.get("packages", {})
+    samples = int(scalars["samples"][-1]) if len(scalars["samples"]) else 0
+    minutes = scalars["seconds"][-1] / 60.0 if samples else 0.0
+    rate = samples / (60.0 * minutes) if minutes else 0.0
+    changed = "" if choices.ablation == "none" else f" with the ablation `{choices.ablation}`"
+    git = versions.get("git", {})
+    commit = f"{git['commit'][:12]}{', changed' if git['dirty'] else ''}" if git.get("commit") else "no checkout"
+    return (
+        f"`{choices.agent}`{changed} learned from the clips `{config.motions}` with the budget `{choices.budget}`, "
+        f"seed {config.seed}: {samples:,} samples (control steps of 1/30 s, {samples / 30 / 3600:.1f} simulated "
+        f"hours) in {minutes:.1f} minutes, {rate:,.0f} samples/s, in {config.num_envs} worlds.\n\n"
+        f"Made on {machine.get('processor', 'an unknown processor')}, {machine.get('cores', '?')} cores, "
+        f"{versions.get('threads', '?')} threads; Python {machine.get('python', '?')}, "
+        f"torch {packages.get('torch', '?')}, mujoco {packages.get('mujoco', '?')}, sources {commit}. "
+        "All settings: [`config.yaml`](config.yaml)."
+    )
+
+
+def _film(folder: Path) -> str:
+    if (folder / runs.VIDEO).is_file():
+        return f"The trained character: [`{runs.VIDEO}`]({runs.VIDEO})"
+    reason = runs.read_json(folder / runs.FILMING, {}).get("reason")
+    return f"No video: {reason}" if reason else ""
+
+
+def _ages(measures: dict[str, Any]) -> str:
+    """The table of the policy at three ages."""
+    if not measures:
+        return ""
+    rows = [
+        f"| {AGES[age]} | {m['length']:.1f} | {m['fall_rate']:.2f} | {m['score']:.3f} "
+        f"| {m['episodes']} | {m['steps']:,} |"
+        for age, m in measures.items()
+    ]
+    text = [
+        "## Did it learn?",
+        "",
+        "Each policy played one episode in each world: started in a clip, with its mean action and random latents, "
+        "until it fell or the clock ran out. The style score is the probability that the *trained* discriminator gives "
+        "for the motion being a clip; one judge for all makes the ages comparable.",
+        "",
+        "| policy | episode length [steps] | fall rate | style score | episodes | steps |",
+        "|---|---:|---:|---:|---:|---:|",
+        *rows,
+    ]
+    if "warm_started" in measures and "untrained" in measures:
+        before, after = measures["untrained"]["length"], measures["warm_started"]["length"]
+        text += [
+            "",
+            "The warm start, a regression on the clips' own next poses before the first sample, changed the length of "
+            f"an episode by {after - before:+.1f} steps.",
+        ]
+    return "\n".join(text)
+
+
+def _mean(values: np.ndarray) -> float:
+    known = values[np.isfinite(values)]
+    return float(known.mean()) if len(known) else float("nan")
+
+
+def _present(scalars: Scalars) -> list[Metric]:
+    return [metric for metric in TRAINING if metric.scalar in scalars]
+
+
+def _first_and_last(scalars: Scalars) -> str:
+    """The first minute against the last one while training; in a short run, its first quarter against its last."""
+    seconds = scalars["seconds"]
+    span = min(60.0, seconds[-1] / 4.0)
+    first, last = seconds <= max(span, seconds[0]), seconds > seconds[-1] - span
+    rows = [
+        f"| {m.title} | {m.show(_mean(scalars[m.scalar][first]))} | {m.show(_mean(scalars[m.scalar][last]))} |"
+        for m in _present(scalars)
+    ]
+    return "\n".join(
+        [
+            "## While training",
+            "",
+            "Means over all worlds, whose starts are mixed (clips, a standing pose, lying on the ground) and whose "
+            "actions have the exploration noise on top.",
+            "",
+            f"| | first {span:.0f} s | last {span:.0f} s |",
+            "|---|---:|---:|",
+            *rows,
+        ]
+    )
+
+
+def _minutes(scalars: Scalars) -> str:
+    """At most twelve rows of equal time."""
+    metrics, seconds = _present(scalars), scalars["seconds"]
+    width = 60.0 * max(1.0, np.ceil(seconds[-1] / 60.0 / _MAX_ROWS))
+    rows = []
+    for begin in np.arange(0.0, seconds[-1], width):
+        inside = (seconds > begin) & (seconds <= begin + width)
+        if inside.any():
+            figures = " | ".join(m.show(_mean(scalars[m.scalar][inside])) for m in metrics)
+            minute, samples = min(begin + width, seconds[-1]) / 60.0, int(scalars["samples"][inside][-1])
+            rows.append(f"| {minute:.1f} | {samples:,} | {figures} |")
+    titles = " | ".join(m.title for m in metrics)
+    return "\n".join([f"| minute | samples | {titles} |", f"|---:|---:|{'---:|' * len(metrics)}", *rows])
+
+
+def _pictures(plots: list[Path], folder: Path) -> str:
+    names = [plot.relative_to(folder).as_posix() for plot in plots]
+    return "\n\n".join(f"![{Path(name).stem.replace('_', ' ')}]({name})" for name in names)
+
+
+def _meanings() -> str:
+    return "\n".join(["## What the figures mean", "", *(f"- **{m.title}**: {m.meaning}" for m in TRAINING)])
+
+
+def _going_on(folder: Path) -> str:
+    return "\n".join(
+        [
+            "## How to go on",
+            "",
+            "```",
+            "# train this run on",
+            f"murmillo train run.resume={folder} runner.max_minutes=60 runner.samples=20_000_000",
+            "# a better fighter, in two hours",
+            "murmillo train budget=laptop",
+            "# another film, and surer figures",
+            f"murmillo record run={folder} seconds=20",
+            f"murmillo evaluate run={folder} worlds=256",
+            "# the curves of all runs, live",
+            f"tensorboard --logdir {folder.parent}",
+            "```",
+        ]
+    )

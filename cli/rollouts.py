@@ -1,0 +1,75 @@
+"""What an agent can do, in episodes: how long it stays up, how often it falls, how much it moves like the clips."""
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from murmillo.agents.common.interface import Agent
+from murmillo.agents.common.rollout import Rollout, tensors, true_next_obs
+from murmillo.envs import HumanoidVectorEnv
+
+
+@dataclass(frozen=True)
+class Measures:
+    """Means over the first episode of each world, started in a clip, with the policy's mean action.
+
+    Attributes:
+        episodes: worlds.
+        steps: control steps that were measured, of all worlds together.
+        length: of an episode [steps]; the clock's end where it never fell.
+        fall_rate: share of the episodes that ended by a fall.
+        score: the judge's probability that a motion is a clip, mean over the steps.
+        rewards: the judge's reward terms by name, mean over the steps.
+    """
+
+    episodes: int
+    steps: int
+    length: float
+    fall_rate: float
+    score: float
+    rewards: dict[str, float]
+
+    def as_dict(self) -> dict[str, Any]:
+        return dataclasses.asdict(self)
+
+
+@torch.no_grad()
+def measure(env: HumanoidVectorEnv, agent: Agent, judge: Agent, seed: int) -> Measures:
+    """Let `agent` play one episode in each world; `judge`, the trained agent, gives the rewards.
+
+    With one judge, policies of different ages can be compared: each one's own discriminator has seen through it.
+    """
+    obs, _ = env.reset(seed=seed, options={"start": "reference"})
+    worlds = env.num_envs
+    agent.reset(torch.arange(worlds))
+    alive = torch.ones(worlds, dtype=torch.bool)
+    length, fell = torch.zeros(worlds), torch.zeros(worlds, dtype=torch.bool)
+    totals: dict[str, float] = {}
+    row = Rollout(1, worlds)
+    while alive.any():
+        seen = tensors(obs)
+        step = agent.act(seen, deterministic=True)
+        obs, _, terminated, truncated, infos = env.step(step.action.numpy())
+        successor = {f"next_{name}": value for name, value in true_next_obs(obs, infos).items()}
+        row.store(0, {**seen, **step.extras, **successor, "action": step.action})
+        for name, value in _terms(judge, row).items():
+            totals[name] = totals.get(name, 0.0) + value[alive].sum().item()
+        length += alive
+        fell |= alive & torch.as_tensor(terminated)
+        done = torch.as_tensor(np.logical_or(terminated, truncated))
+        agent.reset(done.nonzero().flatten())
+        alive &= ~done
+    steps = int(length.sum())
+    means = {name: total / steps for name, total in totals.items()}
+    score = means.pop("score")
+    return Measures(worlds, steps, length.mean().item(), fell.float().mean().item(), score, means)
+
+
+def _terms(judge: Agent, row: Rollout) -> dict[str, Tensor]:
+    """[N] the judge's reward terms and its probability D, from style = -log(1 - D)."""
+    terms = {name: value[0] for name, value in judge.rewards(row).items()}
+    return {**terms, "score": 1.0 - torch.exp(-terms["style"])}

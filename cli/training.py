@@ -1,0 +1,163 @@
+"""One run from its settings to its report: build, warm start, train, measure, film, report."""
+
+import dataclasses
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from murmillo.agents.common import checkpoint
+from murmillo.agents.common.logger import Logger
+from murmillo.agents.common.runner import Runner
+from murmillo.agents.common.warm_start import warm_start
+from murmillo.cli import config as configuration
+from murmillo.cli import report, runs, versions
+from murmillo.cli.agents import AGENTS, checkpoint_meta, make_agent
+from murmillo.cli.checks import check_clips, check_settings
+from murmillo.cli.config import TrainConfig
+from murmillo.cli.errors import user_errors
+from murmillo.cli.evaluate import measure_ages
+from murmillo.cli.progress import Progress, make_progress
+from murmillo.envs import HumanoidVectorEnv
+
+FILM_S = 6
+"""Length of the film: without a graphics card a second of it takes five to draw."""
+
+
+def train(config: TrainConfig, suffix: str = "") -> int:
+    """Train as the settings say; 0 also where a signal ended it early. `suffix` is put behind a default name.
+
+    Raises:
+        CommandError, SuiteError, AgentError: a mistake in the settings; a new run's folder is then not left behind.
+    """
+    check_settings(config)
+    resuming = config.run.resume is not None
+    choices = config.choices
+    name = config.run.name or runs.default_name(choices["agent"], choices["budget"], config.seed, suffix)
+    folder = Path(config.run.resume) if config.run.resume else runs.vacant(config.run.root, name)
+    config.run.name = name
+    check_clips(config)
+    torch.set_num_threads(config.threads or versions.usable_cores())
+    env = HumanoidVectorEnv(config.num_envs, config.env)
+    try:
+        _begin(folder, config, resuming)
+        return _train(config, env, folder, resuming)
+    except user_errors():
+        if not resuming and not (folder / runs.SCALARS).exists():  # not one iteration was made
+            shutil.rmtree(folder, ignore_errors=True)
+        raise
+    finally:
+        env.close()
+
+
+def _begin(folder: Path, config: TrainConfig, resuming: bool) -> None:
+    """Make the folder with the settings and versions; those of a resumed run take the place of its former ones."""
+    folder.mkdir(parents=True, exist_ok=resuming)
+    kept = dataclasses.replace(config, run=dataclasses.replace(config.run, resume=None))
+    configuration.save(kept, folder)
+    runs.write_json(folder / runs.VERSIONS, versions.describe(torch.get_num_threads()))
+
+
+def _train(config: TrainConfig, env: HumanoidVectorEnv, folder: Path, resuming: bool) -> int:
+    agent, generator = make_agent(config.choices["agent"], config.agent, env, config.seed)
+    logger = Logger(folder)
+    # a weight of 0 leaves a term out, which the agent of an ablation does not give
+    weights = {term: weight for term, weight in config.runner.reward_weights.items() if weight}
+    runner = Runner(
+        env,
+        agent,
+        dataclasses.replace(config.runner, reward_weights=weights),
+        generator,
+        folder / runs.LAST,
+        meta=checkpoint_meta(config.choices["agent"], config.agent, env),
+        logger=logger,
+    )
+    if resuming:
+        runner.load(folder / runs.LAST)
+    progress = make_progress(config.runner.samples, runner.samples, config.runner.max_minutes)
+    with progress, _stopping(runner.stop, progress) as stopped:
+        progress.say(f"{folder}: {config.choices['agent']} on {len(env.library.clips)} clips, {config.num_envs} worlds")
+        if not resuming:
+            _warm_start(config, agent, env, generator, progress, folder)
+        begun = time.monotonic()
+        runner.on_iteration = [
+            lambda scalars: progress.show(int(scalars["samples"]), time.monotonic() - begun, scalars)
+        ]
+        runner.run()
+    logger.close()
+    if stopped():
+        report.write(folder)
+        print(f"stopped at {runner.samples:,} samples; go on with: murmillo train run.resume={folder}")
+        return 0
+    _finish(config, folder)
+    return 0
+
+
+def _warm_start(
+    config: TrainConfig,
+    agent: Any,
+    env: HumanoidVectorEnv,
+    generator: torch.Generator,
+    progress: Progress,
+    folder: Path,
+) -> None:
+    """Regress the policy on the clips' next poses, and keep what comes of it for the report."""
+    if config.warm_start.steps == 0:
+        return
+    progress.say(f"warm start: {config.warm_start.steps} steps on the clips' own next poses")
+    condition = AGENTS[config.choices["agent"]].condition
+    losses = warm_start(
+        agent.model,
+        env.imitation_pairs,
+        config.warm_start,
+        generator,
+        lambda n: condition(config.agent, n, generator),
+    )
+    progress.say(f"warm start: squared error of the action from {losses[0]:.4f} to {losses[-1]:.4f}")
+    meta = checkpoint_meta(config.choices["agent"], config.agent, env)
+    checkpoint.save(folder / runs.WARM_STARTED, {"meta": meta, "agent": agent.state_dict()})
+
+
+@contextmanager
+def _stopping(stop: Callable[[], None], progress: Progress) -> Iterator[Callable[[], bool]]:
+    """SIGINT and SIGTERM end the run after the iteration under way; a second SIGINT breaks it off."""
+    signals: list[int] = []
+
+    def handle(number: int, frame: Any) -> None:
+        if number in signals and number == signal.SIGINT:
+            raise KeyboardInterrupt
+        signals.append(number)
+        stop()
+        progress.say("stopping after this iteration; Ctrl-C again breaks off at once")
+
+    before = {number: signal.signal(number, handle) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield lambda: bool(signals)
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _finish(config: TrainConfig, folder: Path) -> None:
+    """Measure the policy before and after training, film it, write the report."""
+    print("measuring the policy before and after training", flush=True)
+    runs.write_json(folder / runs.MEASURES, measure_ages(config, folder, config.run.measured_worlds))
+    if config.run.video:
+        _film(folder)
+    print(f"the report: {report.write(folder)}")
+
+
+def _film(folder: Path) -> None:
+    """Record in a process of its own: no graphics driver can then harm the run. One line says why there is no film."""
+    command = [sys.executable, "-m", "murmillo.cli.main", "record", f"run={folder}", f"seconds={FILM_S}"]
+    done = subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL, check=False)
+    reason = (done.stderr.strip().splitlines() or [f"recording ended with status {done.returncode}"])[-1]
+    runs.write_json(folder / runs.FILMING, {"reason": None if done.returncode == 0 else reason})
+    print(done.stdout.strip() if done.returncode == 0 else f"no video: {reason}")

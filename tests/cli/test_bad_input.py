@@ -1,0 +1,125 @@
+"""A user's mistake: exit status 2, one line on stderr, and nothing left behind."""
+
+import json
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+Murmillo = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture(scope="module")
+def pack(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A copy of the built-in clips, to be spoilt."""
+    folder = tmp_path_factory.mktemp("pack") / "clips"
+    shutil.copytree(str(files("murmillo.assets.motions") / "sword_shield"), folder)
+    return folder
+
+
+def assert_refused(done: tuple[int, str, str], *parts: str) -> None:
+    status, _, err = done
+    assert status == 2, err
+    assert err.startswith("murmillo: ")
+    assert err.count("\n") == 1, err
+    for part in parts:
+        assert part in err
+
+
+@pytest.mark.parametrize(
+    ("words", "parts"),
+    [
+        (("trian",), ("trian", "train")),
+        (("train", "--fast"), ("--fast", "--multirun")),
+        (("train", "sed=1"), ("sed", "seed")),
+        (("train", "num_envs=0"), ("num_envs=0",)),
+        (("train", "run.measured_worlds=0"), ("run.measured_worlds=0",)),
+        (("train", "num_envs=4", "agent.ppo.minibatch=129"), ("agent.ppo.minibatch=129", "128")),
+        (("train", "agent.window=2000"), ("agent.window=2000", "longer than every clip")),
+        (("train", "skills=99"), ("skills=99", "labels", "guard")),
+        (("train", "motions=nowhere"), ("nowhere",)),
+        (("train", "run.name=a/b"), ("run.name=a/b",)),
+        (("train", "run.resume=runs/nothing"), ("run.resume=runs/nothing",)),
+        (("train", "--multirun", "seed=1,x"), ("seed", "'x'")),
+        (("evaluate",), ("run",)),
+        (("evaluate", "run=runs/nothing"), ("run=runs/nothing",)),
+        (("evaluate", "rum=x"), ("rum", "run")),
+        (("evaluate", "run"), ("run", "name=value")),
+        (("doctor", "now"), ("now",)),
+    ],
+)
+def test_wrong_words(murmillo: Murmillo, folder: Path, words: tuple[str, ...], parts: tuple[str, ...]) -> None:
+    assert_refused(murmillo(*words), *parts)
+    assert list(folder.iterdir()) == []
+
+
+def test_an_empty_folder_of_clips(murmillo: Murmillo, folder: Path) -> None:
+    (folder / "clips").mkdir()
+    assert_refused(murmillo("train", "motions=clips"), "clips")
+    assert [path.name for path in folder.iterdir()] == ["clips"]
+
+
+def test_a_foreign_and_a_cut_off_file(murmillo: Murmillo, folder: Path, pack: Path) -> None:
+    (folder / "foreign.npy").write_text("not an array")
+    assert_refused(murmillo("train", "motions=foreign.npy"), "foreign.npy")
+    shutil.copytree(pack, folder / "cut")
+    clip = next((folder / "cut").glob("*.npz"))
+    clip.write_bytes(clip.read_bytes()[:100])
+    assert_refused(murmillo("train", "motions=cut"), clip.name)
+    assert not (folder / "runs").exists()
+
+
+def test_a_clip_with_nan(murmillo: Murmillo, folder: Path, pack: Path) -> None:
+    shutil.copytree(pack, folder / "nan")
+    clip = next((folder / "nan").glob("*.npz"))
+    with np.load(clip) as arrays:
+        spoilt = {
+            name: np.where(np.arange(array.size).reshape(array.shape) == 7, np.nan, array)
+            for name, array in arrays.items()
+            if array.ndim == 2
+        }
+        kept = {name: array for name, array in arrays.items() if array.ndim != 2}
+    np.savez(clip, **spoilt, **kept)
+    assert_refused(murmillo("train", "motions=nan"), clip.name)
+    assert not (folder / "runs").exists()
+
+
+def test_a_run_that_is_there_already(murmillo: Murmillo, folder: Path) -> None:
+    (folder / "runs" / "mine").mkdir(parents=True)
+    assert_refused(murmillo("train", "run.name=mine"), "runs/mine", "run.name", "run.resume")
+    assert list((folder / "runs" / "mine").iterdir()) == []
+
+
+def test_a_reward_weight_without_a_reward(murmillo: Murmillo, folder: Path, tiny: tuple[str, ...]) -> None:
+    """Found out in the first iteration, when the folder exists already: it goes again."""
+    assert_refused(murmillo("train", *tiny, "warm_start.steps=0", "+runner.reward_weights.bounty=1"), "bounty")
+    assert not (folder / "runs").exists() or list((folder / "runs").iterdir()) == []
+
+
+def test_from_the_shell(folder: Path) -> None:
+    """The console script itself: status, streams and no traceback."""
+    command = [sys.executable, "-m", "murmillo.cli.main", "train", "sed=1"]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=folder, check=False)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == "murmillo: sed: there is no such setting; did you mean seed?\n"
+
+
+@pytest.mark.parametrize("words", [(), ("--help",), ("train", "--help"), ("evaluate", "-h"), ("record", "--help")])
+def test_help(murmillo: Murmillo, words: tuple[str, ...]) -> None:
+    status, out, err = murmillo(*words)
+    assert (status, err) == (0, "")
+    assert out.startswith("murmillo")
+
+
+def test_help_is_quick_because_it_imports_no_torch(folder: Path) -> None:
+    code = (
+        "import sys; from murmillo.cli.main import main; main(['train', '--help']);"
+        "import json; print(json.dumps([name for name in ('torch', 'mujoco', 'hydra') if name in sys.modules]))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert json.loads(done.stdout.splitlines()[-1]) == []

@@ -1,0 +1,70 @@
+"""The report of made-up scalars has their means."""
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+from omegaconf import OmegaConf
+
+from murmillo.cli import report, runs
+from murmillo.cli.plots import smooth
+
+
+@pytest.fixture
+def run_folder(tmp_path: Path) -> Path:
+    """Four minutes at 100 samples a second, an iteration of 6,000 samples a minute; two columns, one value missing."""
+    folder = tmp_path / "made_up"
+    folder.mkdir()
+    with (folder / runs.SCALARS).open("w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(["samples", "iteration", "samples_per_second", "episode/length", "discriminator/agent_score"])
+        for minute, length in enumerate((20.0, "", 60.0, 80.0), start=1):
+            writer.writerow([6000 * minute, minute, 100.0, length, 0.1 * minute])
+    config = {
+        "choices": {"agent": "ase", "budget": "smoke", "ablation": "no_diversity"},
+        "motions": "builtin",
+        "seed": 3,
+        "num_envs": 256,
+    }
+    OmegaConf.save(OmegaConf.create(config), folder / runs.CONFIG)
+    measured = {"episodes": 64, "steps": 1216, "fall_rate": 1.0, "score": 0.25, "rewards": {}}
+    ages = {"untrained": {**measured, "length": 19.0}, "warm_started": {**measured, "length": 24.5}}
+    runs.write_json(folder / runs.MEASURES, {**ages, "trained": {**measured, "length": 88.0}})
+    return folder
+
+
+def test_time_is_counted_from_samples_and_speed(run_folder: Path) -> None:
+    assert report.read_scalars(run_folder / runs.SCALARS)["seconds"].tolist() == [60.0, 120.0, 180.0, 240.0]
+
+
+def test_report_has_the_figures(run_folder: Path) -> None:
+    text = report.write(run_folder).read_text()
+    assert "24,000 samples" in text
+    assert "in 4.0 minutes, 100 samples/s" in text
+    assert "`no_diversity`" in text
+    assert "| before training | 19.0 | 1.00 | 0.250 | 64 | 1,216 |" in text
+    assert "by +5.5 steps" in text
+    assert "| Episode length | 20 steps | 80 steps |" in text
+    assert "| 2.0 | 12,000 | - | 0.200 |" in text  # no episode ended in the second minute
+    for picture in ("plots/episode_length.png", "plots/discriminator.png"):
+        assert f"({picture})" in text
+        assert (run_folder / picture).read_bytes().startswith(b"\x89PNG")
+    assert "fall_rate.png" not in text
+
+
+def test_report_says_why_there_is_no_video(run_folder: Path) -> None:
+    runs.write_json(run_folder / runs.FILMING, {"reason": "no OpenGL"})
+    assert "No video: no OpenGL" in report.write(run_folder).read_text()
+    (run_folder / runs.VIDEO).touch()
+    assert "(video.mp4)" in report.write(run_folder).read_text()
+
+
+def test_report_of_a_run_without_an_iteration(run_folder: Path) -> None:
+    (run_folder / runs.SCALARS).unlink()
+    assert "0 samples" in report.write(run_folder).read_text()
+
+
+def test_smooth_leaves_out_what_is_missing() -> None:
+    values = np.array([1.0, np.nan, 3.0, 5.0])
+    assert smooth(values, share=0.75).tolist() == [1.0, 2.0, 4.0, 4.0]

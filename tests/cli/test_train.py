@@ -1,0 +1,124 @@
+"""A run of two iterations from the command to its report, taken up again, measured and filmed."""
+
+import csv
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from murmillo.cli import gl
+
+Murmillo = Callable[..., tuple[int, str, str]]
+
+
+def rows(folder: Path) -> list[dict[str, str]]:
+    with (folder / "scalars.csv").open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_a_run_leaves_all_that_it_should(trained: Path) -> None:
+    for name in ("config.yaml", "versions.json", "scalars.csv", "measures.json", "report.md"):
+        assert (trained / name).is_file(), name
+    assert list(trained.glob("events.out.tfevents.*"))
+    assert list((trained / "plots").glob("*.png"))
+    assert [row["samples"] for row in rows(trained)] == ["64", "128"]
+    assert list(json.loads((trained / "measures.json").read_text())) == ["untrained", "warm_started", "trained"]
+    versions = json.loads((trained / "versions.json").read_text())
+    assert versions["threads"] == 1
+    assert versions["packages"]["torch"]
+
+
+def test_resume_goes_on_with_the_same_settings(murmillo: Murmillo, own_run: Path) -> None:
+    status, _, err = murmillo("train", "run.resume=runs/tiny", "runner.samples=192")
+    assert status == 0, err
+    assert [row["samples"] for row in rows(own_run)] == ["64", "128", "192"]
+    assert "samples: 192" in (own_run / "config.yaml").read_text()
+    status, _, err = murmillo("train", "run.resume=runs/tiny", "seed=2")
+    assert status == 2
+    assert "seed=2" in err
+
+
+def test_resumed_run_equals_an_uninterrupted_one(murmillo: Murmillo, own_run: Path, tiny: tuple[str, ...]) -> None:
+    """64 + 64 + 64 samples through a checkpoint and 192 at once end in the same figures."""
+    assert murmillo("train", "run.resume=runs/tiny", "runner.samples=192")[0] == 0
+    assert murmillo("train", *tiny, "run.name=whole", "runner.samples=192")[0] == 0
+    resumed, whole = rows(own_run)[-1], rows(own_run.parent / "whole")[-1]
+    assert resumed.pop("samples_per_second")
+    assert whole.pop("samples_per_second")
+    assert resumed == whole
+
+
+def test_evaluate(murmillo: Murmillo, own_run: Path) -> None:
+    status, out, err = murmillo("evaluate", "run=runs/tiny", "worlds=4")
+    assert status == 0, err
+    assert "after training" in out
+    figures = json.loads((own_run / "evaluation.json").read_text())
+    assert figures["trained"]["episodes"] == 4
+    assert 0.0 < figures["trained"]["score"] < 1.0
+    assert figures["trained"]["length"] * 4 == pytest.approx(figures["trained"]["steps"])
+
+
+def test_a_checkpoint_of_another_character(murmillo: Murmillo, own_run: Path) -> None:
+    meta = own_run / "checkpoints" / "last" / "meta.json"
+    meta.write_text(meta.read_text().replace('"sword_shield"', '"centaur"'))
+    status, _, err = murmillo("evaluate", "run=runs/tiny", "worlds=4")
+    assert status == 2
+    assert "centaur" in err
+    assert err.count("\n") == 1
+    assert not (own_run / "evaluation.json").exists()
+
+
+def test_multirun_trains_one_run_for_each_value(murmillo: Murmillo, folder: Path, tiny: tuple[str, ...]) -> None:
+    status, _, err = murmillo("train", "--multirun", *tiny, "runner.samples=64", "warm_start.steps=0", "seed=1,2")
+    assert status == 0, err
+    runs = sorted((folder / "runs").iterdir())
+    assert [run.name[20:] for run in runs] == ["ase-smoke-1-0", "ase-smoke-2-1"]
+    assert all((run / "report.md").is_file() for run in runs)
+
+
+@pytest.mark.parametrize("ablation", ["no_skill_discovery", "no_diversity"])
+def test_ablations_train(murmillo: Murmillo, folder: Path, tiny: tuple[str, ...], ablation: str) -> None:
+    status, _, err = murmillo("train", *tiny, f"ablation={ablation}", "runner.samples=64", "run.name=less")
+    assert status == 0, err
+    assert ("reward/skill" in rows(folder / "runs" / "less")[0]) == (ablation != "no_skill_discovery")
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no such signals")
+def test_a_signal_ends_the_run_with_a_checkpoint(folder: Path, tiny: tuple[str, ...]) -> None:
+    command = [sys.executable, "-m", "murmillo.cli.main", "train", *tiny, "runner.samples=1000000000", "run.name=long"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=folder) as process:
+        assert process.stdout is not None
+        for line in process.stdout:
+            if " samples, " in line:
+                process.send_signal(signal.SIGTERM)
+                break
+        out, err = process.communicate(timeout=60)
+    assert process.returncode == 0, err
+    assert "murmillo train run.resume=runs/long" in out
+    assert (folder / "runs" / "long" / "checkpoints" / "last" / "meta.json").is_file()
+
+
+def test_record(own_run: Path, folder: Path) -> None:
+    if all(gl.why_not(backend) for backend in gl.candidates()):
+        pytest.skip("no OpenGL draws on this machine")
+    words = ("record", "run=runs/tiny", "seconds=0.2", "skill=walk_forward")
+    done = subprocess.run(
+        [sys.executable, "-m", "murmillo.cli.main", *words], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert b"ftyp" in (own_run / "video.mp4").read_bytes()[:16]
+    assert list(own_run.glob(".*")) == []
+
+
+def test_record_without_opengl(murmillo: Murmillo, own_run: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("MUJOCO_GL", "off")
+    status, _, err = murmillo("record", "run=runs/tiny")
+    assert status == 2
+    assert err.count("\n") == 1
+    assert "OpenGL" in err
+    assert not (own_run / "video.mp4").exists()
