@@ -25,7 +25,7 @@ def make_env(num_envs: int, **kwargs: Any) -> HumanoidVectorEnv:
     env = HumanoidVectorEnv(num_envs, EnvConfig(window=10, **kwargs))
     env.reset(seed=0)
     for step in range(WARM_UP):
-        env.step(noise(env.action_space.shape, step))
+        env.step(noise((num_envs, 31), step))
     return env
 
 
@@ -52,7 +52,7 @@ def bare_steps_per_second(num_envs: int = 1024, steps: int = 24) -> float:
     env = make_env(num_envs)
     visited = []
     for step in range(steps):
-        action = noise(env.action_space.shape, WARM_UP + step)
+        action = noise((num_envs, 31), WARM_UP + step)
         state = env.physics.state_dict()
         targets = env.character.targets(torch.from_numpy(action).double())
         visited.append([x.numpy() for x in (state["qpos"], state["qvel"], state["qacc_warmstart"], targets)])

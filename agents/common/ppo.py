@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from itertools import chain
 from typing import Any
 
 import torch
@@ -42,7 +43,8 @@ class PPOConfig:
         minibatch: samples a step.
         clip: bound on the ratio's distance from 1.
         bound_weight: of the loss on means beyond [-1, 1].
-        target_kl: stop the passes once a pass moved the policy further than this [nat]; None never stops.
+        target_kl: end the passes at the first minibatch on which the policy is further than this from the one that
+            acted [nat]; None goes on.
     """
 
     hidden: tuple[int, ...] = (1024, 1024, 512)
@@ -158,18 +160,16 @@ class PPO:
         data["target"] = self.model.return_normalizer(rollout.flat("return"))
 
         means = Means()
-        for _ in range(config.epochs):
-            divergence = Means()
-            for rows in rollout.minibatches(config.minibatch, generator):
-                batch = {name: value[rows] for name, value in data.items()}
-                losses, scores = self._losses(batch, condition(batch), extra_loss)
-                self.optimizer.zero_grad()
-                torch.stack(list(losses.values())).sum().backward()
-                self.optimizer.step()
-                means.add({**losses, **scores})
-                divergence.add({"kl": scores["kl"]})
-            if config.target_kl is not None and divergence.result()["kl"] > config.target_kl:
+        passes = [rollout.minibatches(config.minibatch, generator) for _ in range(config.epochs)]
+        for rows in chain.from_iterable(passes):
+            batch = {name: value[rows] for name, value in data.items()}
+            losses, scores = self._losses(batch, condition(batch), extra_loss)
+            means.add({**losses, **scores})
+            if config.target_kl is not None and scores["kl"] > config.target_kl:
                 break
+            self.optimizer.zero_grad()
+            torch.stack(list(losses.values())).sum().backward()
+            self.optimizer.step()
         self.model.state_normalizer.update(rollout["state"])
         self.model.return_normalizer.update(rollout["return"])
         return means.result()

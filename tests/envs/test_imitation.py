@@ -3,6 +3,7 @@
 import subprocess
 import sys
 import warnings
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -20,8 +21,10 @@ IDS = sorted(spec for spec in gymnasium.registry if spec.startswith("murmillo/")
 UPRIGHT = {"starts": {"fallen": 0.0, "recovery": 0.0}}
 
 
-def make(num_envs: int = 4, **kwargs) -> HumanoidVectorEnv:
-    return gymnasium.make_vec(ID, num_envs=num_envs, **kwargs)
+def make(num_envs: int = 4, **kwargs: Any) -> HumanoidVectorEnv:
+    env = gymnasium.make_vec(ID, num_envs=num_envs, **kwargs)
+    assert isinstance(env, HumanoidVectorEnv)
+    return env
 
 
 def noise(env: HumanoidVectorEnv, seed: int) -> np.ndarray:

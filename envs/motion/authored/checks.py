@@ -97,10 +97,12 @@ def _ground(qpos: np.ndarray, model: mujoco.MjModel) -> tuple[float, float]:
         mujoco.mj_kinematics(model, data)
         heights = [_bottom(model, data, geom) for geom in range(model.ngeom) if geom != floor]
         lowest = min(lowest, *heights)
-        path.append([
-            data.geom_xpos[sole] + (corners * model.geom_size[sole]) @ data.geom_xmat[sole].reshape(3, 3).T
-            for sole in soles
-        ])
+        path.append(
+            [
+                data.geom_xpos[sole] + (corners * model.geom_size[sole]) @ data.geom_xmat[sole].reshape(3, 3).T
+                for sole in soles
+            ]
+        )
     points = np.array(path)
     grounded = (points[1:, ..., 2] < GROUNDED) & (points[:-1, ..., 2] < GROUNDED)
     moved = np.linalg.norm(np.diff(points[..., :2], axis=0), axis=-1)

@@ -31,10 +31,19 @@ def walk(pose: Pose, guard: Pose, *, strides: int, length: float, step_time: flo
         foot, side = ("right", -1.0) if count % 2 == 0 else ("left", 1.0)
         first, last = count == 0, count == 2 * strides - 1
         x += length * (0.65 if first else 0.85 if last else 1.0)
-        steps.append(Step(
-            foot, landing - swing - (0.06 if first else 0.0), landing, Place(x, 0.075 * side, 6.5 * side),
-            lift=0.045, push=22.0 if first else 42.0, push_time=0.22, strike=18.0, flat_time=0.09,
-        ))
+        steps.append(
+            Step(
+                foot,
+                landing - swing - (0.06 if first else 0.0),
+                landing,
+                Place(x, 0.075 * side, 6.5 * side),
+                lift=0.045,
+                push=22.0 if first else 42.0,
+                push_time=0.22,
+                strike=18.0,
+                flat_time=0.09,
+            )
+        )
         keys += _step_keys(pose, foot, landing, step_time)
         landing += step_time
 

@@ -104,16 +104,26 @@ def _interpolate(coordinates: np.ndarray, key_times: np.ndarray, time: np.ndarra
     return result
 
 
-def _follow(puppet: Puppet, character: Character, joints: np.ndarray, feet: dict[str, FootPath], pelvis: np.ndarray,
-            rotation: Rotation, start: np.ndarray, support: np.ndarray | None = None) -> np.ndarray:
+def _follow(
+    puppet: Puppet,
+    character: Character,
+    joints: np.ndarray,
+    feet: dict[str, FootPath],
+    pelvis: np.ndarray,
+    rotation: Rotation,
+    start: np.ndarray,
+    support: np.ndarray | None = None,
+) -> np.ndarray:
     """Every frame solved in turn, [F, nq]; balanced over `support` where it is given."""
     puppet.start_from(start)
     wishes = (joints, pelvis, rotation.as_quat(scalar_first=True))
     wished = character.pose(*(torch.from_numpy(wish) for wish in wishes)).numpy()
-    return np.stack([
-        puppet.follow(wished[i], _at(feet, i), pelvis[i], rotation[i], None if support is None else support[i])
-        for i in range(len(joints))
-    ])
+    return np.stack(
+        [
+            puppet.follow(wished[i], _at(feet, i), pelvis[i], rotation[i], None if support is None else support[i])
+            for i in range(len(joints))
+        ]
+    )
 
 
 def _at(feet: dict[str, FootPath], frame: int) -> dict[str, tuple[np.ndarray, Rotation]]:
