@@ -7,8 +7,10 @@ taken back afterwards, so that other processes of the user choose for themselves
 import os
 import sys
 
-_headless = sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
-_choose = _headless and "MUJOCO_GL" not in os.environ
+HEADLESS = sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+"""No screen that a window could open on."""
+
+_choose = HEADLESS and "MUJOCO_GL" not in os.environ
 
 if _choose:
     os.environ["MUJOCO_GL"] = "egl"

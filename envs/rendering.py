@@ -1,10 +1,12 @@
 """Pictures of one world."""
 
+import threading
 from typing import Any
 
 import mujoco
 import numpy as np
 
+from murmillo.envs._opengl import HEADLESS
 from murmillo.envs.character import Character
 from murmillo.envs.errors import SuiteError
 
@@ -48,16 +50,15 @@ class Window:
 
     def __init__(self, character: Character) -> None:
         """Raises SuiteError where there is no screen."""
+        if HEADLESS:  # MuJoCo's viewer would end the process
+            raise SuiteError("render_mode=human: there is no screen (DISPLAY is not set); use rgb_array")
+        from mujoco import viewer  # needs a screen's libraries
+
         self._model = character.render_model()
         self._data = mujoco.MjData(self._model)
-        try:
-            from mujoco import viewer  # needs a screen's libraries
-
-            self._viewer: Any = viewer.launch_passive(self._model, self._data)
-        except Exception as error:
-            raise SuiteError(
-                f"render_mode=human: no window can be opened ({error}); on a machine without a screen use rgb_array"
-            ) from error
+        others = set(threading.enumerate())
+        self._viewer: Any = viewer.launch_passive(self._model, self._data)
+        self._threads = set(threading.enumerate()) - others
 
     def show(self, qpos: np.ndarray) -> None:
         """Show the pose qpos [nq]."""
@@ -67,3 +68,5 @@ class Window:
 
     def close(self) -> None:
         self._viewer.close()
+        for thread in self._threads:  # it draws until it has seen the end; the interpreter must outlive it
+            thread.join(timeout=5.0)

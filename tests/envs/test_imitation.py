@@ -14,6 +14,7 @@ from gymnasium.vector import AutoresetMode
 
 import murmillo.envs
 from murmillo.envs import HumanoidVectorEnv, SuiteError
+from murmillo.envs._opengl import HEADLESS
 from murmillo.envs.observations import character_state
 
 ID = "murmillo/Imitation-v0"
@@ -325,6 +326,27 @@ def test_any_contact_counts_self_contact_as_a_touch():
         touched.append(env.state.ground_force_w[:, others].abs().sum().item())
     assert touched[0] == 0.0
     assert touched[1] > 0.0
+
+
+def test_frames_of_every_world_show_the_character():
+    env = make(2, render_mode="rgb_array", width=160, height=120)
+    env.reset(seed=0)
+    try:
+        frames = env.render()
+    except SuiteError as error:
+        pytest.skip(str(error))
+    assert frames is not None
+    assert [frame.shape for frame in frames] == [(120, 160, 3)] * 2
+    assert frames[0].std() > 10
+    env.close()
+
+
+@pytest.mark.skipif(not HEADLESS, reason="there is a screen")
+def test_a_window_without_a_screen_is_refused_in_one_line():
+    env = make(1, render_mode="human")
+    env.reset(seed=0)
+    with pytest.raises(SuiteError, match="render_mode=human: there is no screen"):
+        env.render()
 
 
 def test_the_package_registers_every_id():
