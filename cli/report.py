@@ -126,8 +126,8 @@ def _first_and_last(scalars: Scalars) -> str:
         [
             "## While training",
             "",
-            "Means over all worlds, whose starts are mixed (clips, a standing pose, lying on the ground) and whose "
-            "actions have the exploration noise on top.",
+            "Means over all worlds, which start as `env.starts` of the settings says and act with the exploration noise "
+            "on top.",
             "",
             f"| | first {span:.0f} s | last {span:.0f} s |",
             "|---|---:|---:|",
