@@ -126,7 +126,7 @@ def _first_and_last(scalars: Scalars) -> str:
         [
             "## While training",
             "",
-            "Means over all worlds, which start as `env.starts` of the settings says and act with the exploration noise "
+            "Means over all worlds, which start as the setting `env.starts` says and act with exploration noise "
             "on top.",
             "",
             f"| | first {span:.0f} s | last {span:.0f} s |",

@@ -39,7 +39,7 @@ def assert_refused(done: tuple[int, str, str], *parts: str) -> None:
         (("train", "sed=1"), ("sed", "seed")),
         (("train", "num_envs=0"), ("num_envs=0",)),
         (("train", "run.measured_worlds=0"), ("run.measured_worlds=0",)),
-        (("train", "num_envs=4", "agent.ppo.minibatch=129"), ("agent.ppo.minibatch=129", "128")),
+        (("train", "num_envs=4", "runner.horizon=32", "agent.ppo.minibatch=129"), ("agent.ppo.minibatch=129", "128")),
         (("train", "agent.window=2000"), ("agent.window=2000", "longer than every clip")),
         (("train", "skills=99"), ("skills=99", "labels", "guard")),
         (("train", "motions=nowhere"), ("nowhere",)),
