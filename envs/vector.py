@@ -28,6 +28,9 @@ STATE_LIMIT = 1e3
 
 RENDERED_WORLDS = 16
 
+_OWN_STATE = ("steps", "free_steps", "skill", "ended", "fell", "history")
+"""What the environment itself carries from step to step, beside the physics and its generator."""
+
 
 @dataclass
 class EnvConfig:
@@ -238,18 +241,15 @@ class HumanoidVectorEnv(VectorEnv):
 
     def state_dict(self) -> dict[str, Any]:
         """All that the next step depends on."""
-        return {"physics": self.physics.state_dict(), "generator": self._generator.get_state(), **self._clocks()}
+        own = {name: getattr(self, f"_{name}").clone() for name in _OWN_STATE}
+        return {"physics": self.physics.state_dict(), "generator": self._generator.get_state(), **own}
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Continue from `state_dict`, bit for bit."""
         self.physics.load_state_dict(state["physics"])
         self._generator.set_state(state["generator"])
-        for name, tensor in self._clocks().items():
-            tensor.copy_(state[name])
-
-    def _clocks(self) -> dict[str, Tensor]:
-        names = ("steps", "free_steps", "skill", "ended", "fell", "history")
-        return {name: getattr(self, f"_{name}") for name in names}
+        for name in _OWN_STATE:
+            setattr(self, f"_{name}", state[name].clone())
 
     # --- inside a step -----------------------------------------------------------------------------------------------
 
@@ -309,7 +309,7 @@ class HumanoidVectorEnv(VectorEnv):
         self._free_steps[ids] = torch.where(free, self.config.starts.free_steps, 0)
         skills = torch.randint(len(self.skills), (len(ids),), generator=self._generator)
         self._skill = self._skill.index_copy(0, ids, skills)
-        self._ended = self._ended & ~mask if self._mode is not AutoresetMode.SAME_STEP else self._ended
+        self._ended = self._ended & ~mask
         self.task.reset(ids, self.state)
 
     def _observation(self) -> dict[str, np.ndarray]:
@@ -325,8 +325,8 @@ def _check(config: EnvConfig, render_mode: str | None, modes: list[str]) -> None
     for name, least in (("window", 1), ("episode_steps", 1), ("residual_force", 0), ("width", 1), ("height", 1)):
         if getattr(config, name) < least:
             raise SuiteError(f"{name}={getattr(config, name)}: needs at least {least}")
-    for name, known in (("autoreset", ("same_step", "next_step", "disabled")),):
-        if getattr(config, name) not in known:
-            raise SuiteError(f"{name}={getattr(config, name)}: no such mode; there are: {', '.join(known)}")
+    known = [mode.name.lower() for mode in AutoresetMode]
+    if config.autoreset not in known:
+        raise SuiteError(f"autoreset={config.autoreset}: no such mode; there are: {', '.join(known)}")
     if render_mode is not None and render_mode not in modes:
         raise SuiteError(f"render_mode={render_mode}: no such mode; there are: {', '.join(modes)}")
