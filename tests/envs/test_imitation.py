@@ -251,8 +251,10 @@ def test_state_dict_continues_bit_for_bit():
     for step in range(40):
         one.step(noise(one, step))
     kept = one.state_dict()
+    steps = kept["steps"].clone()
     one.step(noise(one, 40))
-    one.load_state_dict(kept)  # what was kept has not moved with the environment
+    assert torch.equal(kept["steps"], steps)  # what was kept does not move with the environment
+    one.load_state_dict(kept)
     other.load_state_dict(kept)
     for step in range(60):
         (a, _, end_a, _, _), (b, _, end_b, _, _) = (env.step(2 * noise(one, 100 + step)) for env in (one, other))
