@@ -10,9 +10,9 @@ import yaml
 from murmillo.envs.character import Character
 from murmillo.envs.errors import MotionError
 from murmillo.envs.motion.clip import Clip
+from murmillo.envs.motion.formats.poselib import read_poselib
 from murmillo.envs.motion.manifest import MANIFEST
 from murmillo.envs.motion.native import read_clips, save_clips
-from murmillo.envs.motion.poselib import read_poselib
 from murmillo.envs.motion.reading import read_bytes
 
 __all__ = ["BUILTIN", "load_clips", "save_clips"]

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from murmillo.envs.character import Character
 from murmillo.envs.errors import MotionError
 from murmillo.envs.motion.clip import Clip, check_clip
+from murmillo.envs.motion.formats.npy import read_float_array
 from murmillo.envs.motion.manifest import MANIFEST, entry_of, read_manifest, write_manifest
-from murmillo.envs.motion.npy import read_float_array
 from murmillo.envs.motion.reading import read_bytes
 
 _MEMBER = "qpos.npy"

@@ -6,7 +6,7 @@ import torch
 
 from murmillo.envs.character import load_character
 from murmillo.envs.motion import Clip, load_clips
-from murmillo.envs.motion.authored.checks import measure, tracking_error
+from murmillo.envs.motion.measures import measure, tracking_error
 
 CHARACTER = load_character("sword_shield")
 CLIPS = {clip.name: clip for clip in load_clips("builtin", CHARACTER)}
@@ -74,7 +74,7 @@ def test_measures_see_a_broken_clip() -> None:
 
 
 def test_motion_between_keys_does_not_overshoot() -> None:
-    pytest.importorskip("scipy", reason="the generator needs the authoring extra: pip install murmillo[authoring]")
+    pytest.importorskip("scipy", reason="the generator needs the motion extra: pip install murmillo[motion]")
     from murmillo.envs.motion.authored.timing import through_keys
 
     times, values = np.array([0.0, 0.5, 0.6, 1.5]), np.array([[0.0], [1.0], [1.9], [2.0]])
@@ -85,7 +85,7 @@ def test_motion_between_keys_does_not_overshoot() -> None:
 
 def test_centre_of_mass_obeys_the_cart_on_a_table() -> None:
     """p = c - (h / g) c'' holds inside, and the body rests over the pressure at both ends."""
-    pytest.importorskip("scipy", reason="the generator needs the authoring extra: pip install murmillo[authoring]")
+    pytest.importorskip("scipy", reason="the generator needs the motion extra: pip install murmillo[motion]")
     from murmillo.envs.motion.authored.timing import centre_of_mass
 
     pressure = np.zeros((181, 2))
@@ -98,9 +98,9 @@ def test_centre_of_mass_obeys_the_cart_on_a_table() -> None:
 
 
 def test_generator_makes_the_shipped_clip() -> None:
-    pytest.importorskip("mink", reason="the generator needs the authoring extra: pip install murmillo[authoring]")
+    pytest.importorskip("mink", reason="the generator needs the motion extra: pip install murmillo[motion]")
     from murmillo.envs.motion.authored.generate import generate
-    from murmillo.envs.motion.authored.skills import shield_bash
+    from murmillo.envs.motion.authored.skills.shield import shield_bash
 
     made = generate(shield_bash(), CHARACTER)
     np.testing.assert_allclose(made.qpos, CLIPS["shield_bash"].qpos, atol=2e-3)

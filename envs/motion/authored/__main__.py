@@ -14,10 +14,10 @@ from rich.table import Table
 from murmillo.envs.character import load_character
 from murmillo.envs.errors import SuiteError
 from murmillo.envs.motion import Clip, save_clips
-from murmillo.envs.motion.authored.checks import Measures, measure
 from murmillo.envs.motion.authored.generate import generate
 from murmillo.envs.motion.authored.sheet import draw
 from murmillo.envs.motion.authored.skills import SKILLS
+from murmillo.envs.motion.measures import Measures, measure
 
 SHIPPED = Path(__file__).resolve().parents[3] / "assets" / "motions" / "sword_shield"
 COLUMNS = ("s", "slide", "lowest", "limits", "speed", "jump", "tracked", "closure")

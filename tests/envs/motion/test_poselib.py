@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 
 from murmillo.envs.errors import MotionError
 from murmillo.envs.motion import Clip, load_clips
-from murmillo.envs.motion.npy import split_npy
-from murmillo.envs.motion.poselib import read_poselib
-from murmillo.envs.motion.safe_unpickle import read_pickle
+from murmillo.envs.motion.formats.npy import split_npy
+from murmillo.envs.motion.formats.poselib import read_poselib
+from murmillo.envs.motion.formats.safe_unpickle import read_pickle
 from murmillo.envs.motion.velocities import clip_velocities
 from murmillo.envs.rotations import quat_rotate
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from murmillo.envs.errors import MotionError
-from murmillo.envs.motion.safe_unpickle import read_pickle
+from murmillo.envs.motion.formats.safe_unpickle import read_pickle
 
 
 class Call:

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from typing import Any
 
 from murmillo.envs.errors import MotionError
-from murmillo.envs.motion.pickled_numpy import CONSTRUCTORS, Array, Dtype, RefusedError, text
+from murmillo.envs.motion.formats.pickled_numpy import CONSTRUCTORS, Array, Dtype, RefusedError, text
 
 _MAX_INSTRUCTIONS = 100_000
 """A clip needs some four hundred. Each may make an object, so this bounds memory."""

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from murmillo.envs.character import Character
 from murmillo.envs.errors import MotionError
 from murmillo.envs.motion.clip import Clip, check_clip
-from murmillo.envs.motion.npy import split_npy
-from murmillo.envs.motion.safe_unpickle import read_pickle
+from murmillo.envs.motion.formats.npy import split_npy
+from murmillo.envs.motion.formats.safe_unpickle import read_pickle
 
 _Floats = NDArray[np.float64]
 
