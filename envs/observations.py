@@ -1,5 +1,6 @@
 """The state that every policy and discriminator sees; one function for the simulation and for clips."""
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -57,6 +58,35 @@ def character_state(character: Character, qpos: Tensor, qvel: Tensor, key_pos_w:
         key_pos_h.flatten(-2),
     ]
     return torch.cat(parts, dim=-1).float()
+
+
+def feature_mask(character: Character, masked: Collection[str]) -> Tensor:
+    """Columns of `character_state` that tell of these key bodies.
+
+    They are the bodies' key points, which C·ASE's adaptive masking leaves out, and the rotation and velocity of a joint
+    whose body carries nothing else: without a sword, the wrist that would hold it has nothing to say either.
+
+    Args:
+        masked: names among `character.key_bodies`.
+
+    Returns:
+        [D] bool.
+    """
+    layout, model = _layout(character), character.model
+    mask = torch.zeros(state_dim(character), dtype=torch.bool)
+    rotation, velocity = 13, 13 + layout.width
+    for joint in character.joints:
+        rotation_end = rotation + (6 if joint.kind == "ball" else 1)
+        velocity_end = velocity + joint.dof.stop - joint.dof.start
+        body = int(model.joint(joint.name).bodyid[0])
+        carried = [model.body(child).name for child in range(model.nbody) if model.body_parentid[child] == body]
+        if carried and all(child in masked for child in carried):
+            mask[rotation:rotation_end] = mask[velocity:velocity_end] = True
+        rotation, velocity = rotation_end, velocity_end
+    mask[-3 * len(character.key_bodies) :] = torch.tensor(
+        [body in masked for body in character.key_bodies]
+    ).repeat_interleave(3)
+    return mask
 
 
 @dataclass(frozen=True)

@@ -223,10 +223,12 @@ class HumanoidVectorEnv(VectorEnv):
         """Windows of the clips, made by the function that makes the observations.
 
         Returns:
-            window: [n, W, 120]; skill: [n] their labels; of the skills [n] asked for, or by the clips' weights.
+            window: [n, W, 120]; skill: [n] their labels; of the skills [n] asked for, or by the clips' weights. Where
+            clips were made without a sword or a shield, also mask: [n, 120] bool, true for features that are made up.
         """
         clip, time = self.library.sample(n, generator, skill)
-        return {"window": self.library.window(clip, time, self.config.window), "skill": self.library.clip_skill[clip]}
+        drawn = {"window": self.library.window(clip, time, self.config.window), "skill": self.library.clip_skill[clip]}
+        return drawn if self.library.mask is None else drawn | {"mask": self.library.mask[clip]}
 
     def imitation_pairs(self, n: int, generator: torch.Generator) -> dict[str, Tensor]:
         """`state` [n, 120] of the clips, their `skill` [n], and the `action` [n, A] that targets the next pose."""

@@ -61,7 +61,10 @@ class Agent(Protocol):
 
 
 class Demonstrations(Protocol):
-    """Draws windows of the reference motions: `{"window": [n, W, D], "skill": [n]}`, oldest frame first."""
+    """Draws windows of the reference motions: `{"window": [n, W, D], "skill": [n]}`, oldest frame first.
+
+    A third entry, `mask` [n, D] bool, may say which features of a window are not to be judged by.
+    """
 
     def __call__(self, n: int, generator: torch.Generator, skill: Tensor | None = None) -> dict[str, Tensor]: ...
 

@@ -32,6 +32,8 @@ class Clip:
         redistributable: whether the licence lets it, and weights trained on it, be passed on freely.
         weight: sampling weight against the other clips, > 0.
         loop: whether the last frame leads into the first.
+        masked: key bodies that the source had not, such as sword and shield: what the clip shows of them is made up,
+            and no discriminator should judge by it.
 
     Raises:
         MotionError: a rate, a frame or a weight that no clip can have.
@@ -47,6 +49,7 @@ class Clip:
     redistributable: bool
     weight: float = 1.0
     loop: bool = False
+    masked: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if not all(text and text.isprintable() for text in (self.name, self.label)):
@@ -86,7 +89,8 @@ def check_clip(clip: Clip, character: Character) -> Clip:
     Checking what has been checked changes no bit.
 
     Raises:
-        MotionError: a clip of another character or layout, or a frame whose quaternion is not a rotation.
+        MotionError: a clip of another character or layout, a masked body that the character has not, or a frame whose
+            quaternion is not a rotation.
     """
     if clip.character != character.name:
         raise MotionError(
@@ -96,6 +100,11 @@ def check_clip(clip: Clip, character: Character) -> Clip:
         raise MotionError(
             f"clip {clip.name}: frames have {clip.qpos.shape[1]} numbers, {character.name} has {character.model.nq}; "
             "export it anew for this character"
+        )
+    foreign = [body for body in clip.masked if body not in character.key_bodies]
+    if foreign:
+        raise MotionError(
+            f"clip {clip.name}: masks {foreign[0]!a}, {character.name} has {', '.join(character.key_bodies)}; use one"
         )
     qpos = clip.qpos.copy()
     rotations = {"root": slice(3, 7)} | {joint.name: joint.qpos for joint in character.joints if joint.kind == "ball"}

@@ -10,7 +10,7 @@ from murmillo.envs.character import CONTROL_DT, Character
 from murmillo.envs.errors import MotionError
 from murmillo.envs.motion.clip import Clip, check_clip
 from murmillo.envs.motion.velocities import clip_velocities
-from murmillo.envs.observations import character_state
+from murmillo.envs.observations import character_state, feature_mask
 from murmillo.envs.rotations import slerp
 
 _ON_FRAME = 1e-4
@@ -26,6 +26,7 @@ class MotionLibrary:
         clip_skill: [C] int64 index into `skills`.
         weight: [C] float64 sampling weights, as the clips have them.
         duration: [C] float64 [s].
+        mask: [C, D] bool, true where the clip says nothing of a feature of the state; None where all say everything.
     """
 
     def __init__(self, clips: Sequence[Clip], character: Character, device: str | torch.device = "cpu") -> None:
@@ -38,6 +39,8 @@ class MotionLibrary:
         self.clip_skill = torch.tensor([self.skills.index(clip.label) for clip in clips], device=self.device)
         self.weight = torch.tensor([clip.weight for clip in clips], dtype=torch.float64, device=self.device)
         self.duration = torch.tensor([clip.duration for clip in clips], dtype=torch.float64, device=self.device)
+        masks = torch.stack([feature_mask(character, clip.masked) for clip in self.clips])
+        self.mask = masks.to(self.device) if masks.any() else None
         self._fps = torch.tensor([clip.fps for clip in clips], dtype=torch.float64, device=self.device)
         starts = list(accumulate((clip.frames for clip in clips), initial=0))
         self._first = torch.tensor(starts[:-1], device=self.device)

@@ -2,7 +2,9 @@
 
 {"format": "murmillo-clips/1", "character": "sword_shield", "clips": [
   {"file": "walk.npz", "name": "walk", "label": "walk", "fps": 30.0, "frames": 61, "loop": true, "source": "...",
-   "licence": "...", "redistributable": true, "weight": 1.0, "sha256": "..."}]}
+   "licence": "...", "redistributable": true, "weight": 1.0, "masked": [], "sha256": "..."}]}
+
+Manifests written before clips could be masked lack that field.
 """
 
 import json
@@ -16,6 +18,7 @@ MANIFEST = "manifest.json"
 _FORMAT = "murmillo-clips/1"
 _NUMBER = (int, float)
 _PLAIN_NAME = re.compile(r"[\w().-]+\.npz", re.ASCII)
+_OPTIONAL = {"masked"}
 _FIELDS: dict[str, type | tuple[type, ...]] = {
     "file": str,
     "name": str,
@@ -27,6 +30,7 @@ _FIELDS: dict[str, type | tuple[type, ...]] = {
     "licence": str,
     "redistributable": bool,
     "weight": _NUMBER,
+    "masked": list,
     "sha256": str,
 }
 
@@ -44,6 +48,7 @@ def entry_of(clip: Clip, file: str, sha256: str) -> dict[str, Any]:
         "licence": clip.licence,
         "redistributable": clip.redistributable,
         "weight": clip.weight,
+        "masked": list(clip.masked),
         "sha256": sha256,
     }
 
@@ -82,13 +87,15 @@ def _wrong_fields(entry: Any) -> str:
     """The names of an entry's fields that are not as they should be."""
     if not isinstance(entry, dict):
         return "all"
-    wrong = set(entry) ^ set(_FIELDS)
+    wrong = (set(entry) ^ set(_FIELDS)) - (_OPTIONAL - set(entry))
     for key in set(entry) & set(_FIELDS):
         value, kind = entry[key], _FIELDS[key]
         # bool is an int to Python, but no rate or weight
         fits = isinstance(value, kind) and (kind is bool or not isinstance(value, bool))
         if not fits or (kind == _NUMBER and not 0.0 < value < 1e9):
             wrong.add(key)
+    if not all(isinstance(body, str) for body in entry.get("masked", ())):
+        wrong.add("masked")
     if "file" not in wrong and not _PLAIN_NAME.fullmatch(entry["file"]):
         wrong.add("file (must be a plain name)")
     return ", ".join(sorted(wrong))[:120]

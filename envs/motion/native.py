@@ -131,6 +131,7 @@ def _read_clip(file: Path, entry: dict[str, Any], character: str) -> Clip:
         redistributable=entry["redistributable"],
         weight=float(entry["weight"]),
         loop=entry["loop"],
+        masked=tuple(entry.get("masked", ())),
     )
 
 

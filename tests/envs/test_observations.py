@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from murmillo.envs.character import Character, load_character
-from murmillo.envs.observations import character_state, state_dim
+from murmillo.envs.observations import character_state, feature_mask, state_dim
 from murmillo.envs.physics import make_physics
 from murmillo.envs.rotations import quat_from_rotvec, quat_mul, quat_rotate
 
@@ -88,3 +88,28 @@ def test_velocities_are_those_mujoco_integrates(character):
     assert now[9].item() == pytest.approx(world[2].item(), rel=1e-5)
     angular_w = quat_rotate(qpos[0, 3:7], qvel[0, 3:6])
     assert now[12].item() == pytest.approx(angular_w[2].item(), rel=1e-5)
+
+
+def test_masked_bodies_are_the_only_ones_whose_features_are_left_out(character):
+    """Moving sword or shield changes masked features alone; moving anything else changes others."""
+    qpos = character.default_qpos.clone()
+    qpos[7:] = torch.rand(len(qpos) - 7, generator=torch.Generator().manual_seed(0), dtype=torch.float64)
+    for joint in character.joints:
+        if joint.kind == "ball":
+            qpos[joint.qpos] /= qpos[joint.qpos].norm()
+    wrist = next(joint for joint in character.joints if joint.name == "right_wrist")
+    turned = qpos.clone()
+    turned[wrist.qpos] = torch.tensor([1.0, 0.0, 0.0, 0.0], dtype=torch.float64)
+    still = torch.zeros(character.model.nv, dtype=torch.float64)
+
+    def state(pose):
+        return character_state(character, pose, still, character.key_positions(pose))
+
+    mask = feature_mask(character, ("sword",))
+    assert mask.sum() == 6 + 3 + 3  # rotation and velocity of the wrist, the tip
+    changed = state(qpos) != state(turned)
+    assert changed.any()
+    assert not (changed & ~mask).any()
+    assert feature_mask(character, ("shield",)).nonzero().flatten().tolist() == [117, 118, 119]
+    assert feature_mask(character, ("sword", "shield")).sum() == 15
+    assert not feature_mask(character, ()).any()

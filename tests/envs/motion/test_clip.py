@@ -53,6 +53,11 @@ def test_names_frame_and_joint_of_a_quaternion_that_is_no_rotation(make_clip, ch
         check_clip(make_clip(qpos=qpos), character)
 
 
+def test_refuses_to_mask_what_the_character_has_not(make_clip, character):
+    with pytest.raises(MotionError, match="masks 'halberd', sword_shield has right_hand, left_hand"):
+        check_clip(replace(make_clip(), masked=("sword", "halberd")), character)
+
+
 def test_refuses_another_character_and_another_width(make_clip, character):
     with pytest.raises(MotionError, match="for the character dragon, not sword_shield"):
         check_clip(replace(make_clip(), character="dragon"), character)

@@ -19,7 +19,11 @@ from murmillo.envs.motion import load_clips, save_clips
 def pack(tmp_path, make_clip) -> Path:
     folder = tmp_path / "pack"
     save_clips(
-        folder, [make_clip("walk", seed=1, weight=0.1, loop=True), make_clip("Kick (left)", seed=2, fps=29.857397)]
+        folder,
+        [
+            make_clip("walk", seed=1, weight=0.1, loop=True, masked=("sword",)),
+            make_clip("Kick (left)", seed=2, fps=29.857397),
+        ],
     )
     return folder
 
@@ -39,7 +43,18 @@ def test_round_trip_is_exact_to_the_bit(pack, character, make_clip):
     save_clips(pack.parent / "again", loaded)
     for clip, again in zip(loaded, load_clips(pack.parent / "again", character), strict=True):
         assert clip.qpos.tobytes() == again.qpos.tobytes()
-        for field in ("name", "character", "fps", "label", "source", "licence", "redistributable", "weight", "loop"):
+        for field in (
+            "name",
+            "character",
+            "fps",
+            "label",
+            "source",
+            "licence",
+            "redistributable",
+            "weight",
+            "loop",
+            "masked",
+        ):
             assert getattr(clip, field) == getattr(again, field)
     assert [clip.name for clip in loaded] == ["walk", "Kick (left)"]
     np.testing.assert_allclose(np.abs(loaded[0].qpos), np.abs(make_clip(seed=1).qpos), atol=1e-15)
@@ -77,6 +92,8 @@ def test_one_clip_of_a_folder(pack, character):
         (lambda m: m["clips"][0].update(fps=0), "wrong fields: 'fps'"),
         (lambda m: m["clips"][0].update(fps=True), "wrong fields: 'fps'"),
         (lambda m: m["clips"][0].update(weight=10**400), "wrong fields: 'weight'"),
+        (lambda m: m["clips"][0].update(masked="sword"), "wrong fields: 'masked'"),
+        (lambda m: m["clips"][0].update(masked=[1]), "wrong fields: 'masked'"),
         (lambda m: m["clips"][0].update(speed=1.0), "wrong fields: 'speed'"),
         (lambda m: m["clips"][0].update(file="../walk.npz"), "plain name"),
         (lambda m: m["clips"][0].update(file="absent.npz"), "absent.npz: cannot be read"),
@@ -270,3 +287,8 @@ def test_paths_without_clips(tmp_path, character):
     ]:
         with pytest.raises(MotionError, match=reason):
             load_clips(tmp_path / path, character)
+
+
+def test_a_manifest_from_before_clips_could_be_masked_is_read(pack, character):
+    edit_manifest(pack, lambda m: [clip.pop("masked") for clip in m["clips"]])
+    assert [clip.masked for clip in load_clips(pack, character)] == [(), ()]

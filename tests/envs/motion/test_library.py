@@ -148,3 +148,9 @@ def test_before_a_clip_begins_its_first_frame_is_repeated(library):
 def test_a_window_may_be_longer_than_its_clip(library):
     window = library.window(torch.tensor([3]), torch.tensor([0.05]), 10)[0]
     torch.testing.assert_close(window[:8], features(library, [3], [0.0])[0].expand(8, 120))
+
+
+def test_mask_says_which_features_a_clip_made_up(make_clip, character):
+    library = MotionLibrary([make_clip("one"), make_clip("two", masked=("shield",))], character)
+    assert library.mask.sum(-1).tolist() == [0, 3]
+    assert MotionLibrary([make_clip("one")], character).mask is None
