@@ -20,6 +20,7 @@ CONTROL_DT = 1.0 / 30.0
 _KEY = "key_"  # sites of this prefix are the papers' key points
 _GROUND = "ground_"  # contact sensors of this prefix hold the ground's force on a body
 _VISUAL_GROUP = 2  # geoms that are seen but touch nothing
+_BOX = 6  # bounds of a ball joint's exponential map
 
 SpecEdit = Callable[[mujoco.MjSpec], None]
 
@@ -59,6 +60,8 @@ class Character:
         key_bodies: names of the K key points.
         feet: the bodies that may touch the ground.
         action_offset, action_scale: [A] [rad], float64.
+        joint_limits: [A, 2] lowest and highest joint coordinate [rad], float64: of a hinge its range, of a ball joint
+            the box of its exponential map (the MJCF's `user`), which the engine does not enforce.
     """
 
     def __init__(self, name: str, spec: mujoco.MjSpec) -> None:
@@ -83,6 +86,7 @@ class Character:
         low, high = torch.from_numpy(model.actuator_ctrlrange.copy()).unbind(-1)
         self.action_offset = 0.5 * (low + high)
         self.action_scale = 0.5 * (high - low)
+        self.joint_limits = torch.from_numpy(np.vstack([joint_box(model, joint.name) for joint in self.joints]))
 
     @property
     def action_dim(self) -> int:
@@ -205,6 +209,20 @@ def load_character(name: str = "sword_shield", edit: SpecEdit | None = None) -> 
     if edit is not None:
         edit(spec)
     return Character(name, spec)
+
+
+def joint_box(model: mujoco.MjModel, name: str) -> np.ndarray:
+    """Lowest and highest coordinates of a joint [1 or 3, 2] [rad]: a hinge's range, a ball's box about x, y and z.
+
+    Raises:
+        SuiteError: a ball joint whose MJCF has no box, six numbers in its `user`.
+    """
+    joint = model.joint(name)
+    if joint.type[0] == mujoco.mjtJoint.mjJNT_HINGE:
+        return joint.range.reshape(1, 2).copy()
+    if joint.user.size != _BOX or not joint.user.any():
+        raise SuiteError(f"joint {name}: has no box; give it six bounds [rad] in user and the size nuser_jnt={_BOX}")
+    return joint.user.reshape(3, 2).copy()
 
 
 def _without_visuals(spec: mujoco.MjSpec) -> mujoco.MjSpec:

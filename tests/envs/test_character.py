@@ -145,3 +145,40 @@ def test_a_model_that_breaks_a_convention_is_refused():
 
     with pytest.raises(SuiteError, match="rotated in its parent"):
         load_character(edit=rotate)
+
+
+def test_the_humanoid_is_the_murmillo_with_empty_hands(character):
+    """Its 15 bodies weigh the same; action 0 is the middle of each range, 1 a whole range away (AdaptNet's mapping)."""
+    humanoid = load_character("humanoid")
+    assert humanoid.bodies == tuple(body for body in character.bodies if body not in ("sword", "shield"))
+    assert humanoid.action_dim == 28
+    assert humanoid.key_bodies == ("right_hand", "left_hand", "right_foot", "left_foot")
+    for body, mass in zip(humanoid.bodies, humanoid.model.body_mass[1:], strict=True):
+        assert mass == pytest.approx(MASSES[body], abs=1e-3), body
+    low, high = humanoid.joint_limits.unbind(-1)
+    torch.testing.assert_close(humanoid.action_offset, 0.5 * (low + high), atol=1e-6, rtol=0)
+    torch.testing.assert_close(humanoid.action_scale, high - low, atol=1e-6, rtol=0)
+    gains = {
+        "abdomen": (600, 60, 125), "neck": (50, 5, 20), "right_shoulder": (200, 20, 70), "left_elbow": (150, 15, 60),
+        "left_hip": (300, 30, 125), "right_knee": (300, 30, 100), "left_ankle": (200, 20, 50),
+    }  # fmt: skip
+    for name, (kp, kd, effort) in gains.items():
+        i = next(joint.action.start for joint in humanoid.joints if joint.name == name)
+        assert (humanoid.model.actuator_gainprm[i, 0], -humanoid.model.actuator_biasprm[i, 2]) == (kp, kd), name
+        assert tuple(humanoid.model.actuator_forcerange[i]) == (-effort, effort), name
+    assert lowest_point(humanoid, humanoid.default_qpos).item() == pytest.approx(0.0, abs=1e-4)
+
+
+def test_joint_limits_are_the_published_boxes(character):
+    boxes = {joint.name: np.degrees(character.joint_limits[joint.action].numpy()) for joint in character.joints}
+    np.testing.assert_allclose(boxes["abdomen"], [[-60, 60], [-60, 90], [-50, 50]], atol=1e-4)
+    np.testing.assert_allclose(boxes["left_hip"], [[-15, 60], [-140, 60], [-35, 60]], atol=1e-4)
+    np.testing.assert_allclose(boxes["right_knee"], [[0, 160]], atol=1e-4)
+
+
+def test_a_ball_joint_without_a_box_is_refused():
+    def forget(spec: mujoco.MjSpec) -> None:
+        spec.joint("neck").userdata = []
+
+    with pytest.raises(SuiteError, match="joint neck: has no box"):
+        load_character(edit=forget)
