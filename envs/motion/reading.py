@@ -1,5 +1,6 @@
 """Reading the bytes of a motion file, within bounds."""
 
+import os
 from pathlib import Path
 
 from murmillo.envs.errors import MotionError
@@ -16,9 +17,11 @@ def read_bytes(file: Path) -> bytes:
     """
     try:
         with file.open("rb") as stream:
-            data = stream.read(_MAX_BYTES + 1)
+            size = os.fstat(stream.fileno()).st_size
+            # as much as it has: what is asked for is allocated first; a device has no size, and no end
+            data = b"" if size > _MAX_BYTES else stream.read(size or _MAX_BYTES + 1)
     except OSError as error:
         raise MotionError(f"{file}: cannot be read ({error.strerror or error}); check the path") from None
-    if len(data) > _MAX_BYTES:
+    if max(size, len(data)) > _MAX_BYTES:
         raise MotionError(f"{file}: is larger than {_MAX_BYTES // 2**20} MB; cut the recording into clips")
     return data

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from murmillo.envs.errors import MotionError
 
 _MAGIC = b"\x93NUMPY"
+_NUMBERS = ("<f2", "<f4", "<f8", ">f4", ">f8", "<i4", "<i8", "<u4", "<u8", "|i1", "|u1")
 _HEADER = re.compile(
     r"\{'descr': '([^']{1,16})', 'fortran_order': (True|False), 'shape': \(((?:\d{1,12}(?:, ?|(?=\)))){0,8})\), \}\s*"
 )
@@ -38,6 +39,21 @@ def split_npy(data: bytes, place: str) -> tuple[str, tuple[int, ...], bytes]:
     if fortran == "True":
         raise MotionError(f"{place}: the array is in Fortran order; save numpy.ascontiguousarray of it")
     return descr, tuple(int(size) for size in re.findall(r"\d+", sizes)), data[end:]
+
+
+def read_numbers(data: bytes, place: str) -> NDArray[np.float64]:
+    """The array of a .npy file of numbers of any usual type, as float64.
+
+    Raises:
+        MotionError: not numbers, or more or fewer of them than the header states.
+    """
+    descr, shape, payload = split_npy(data, place)
+    if descr not in _NUMBERS:
+        raise MotionError(f"{place}: holds values of type {descr!a}; save numbers, such as float64 (<f8)")
+    dtype = np.dtype(descr)
+    if math.prod(shape) * dtype.itemsize != len(payload):
+        raise MotionError(f"{place}: {len(payload)} bytes do not make the shape {list(shape)}; copy the file anew")
+    return np.frombuffer(payload, dtype=dtype).reshape(shape).astype(np.float64)
 
 
 def read_float_array(data: bytes, place: str) -> NDArray[np.float64]:

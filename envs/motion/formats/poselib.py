@@ -4,6 +4,7 @@ The format, as the files released with ASE show it: quaternions are xyzw and loc
 rotation in the world; positions are metres, z up; the rate is not always a round number (29.857 to 30 Hz).
 """
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,10 @@ from numpy.typing import NDArray
 from murmillo.envs.character import Character
 from murmillo.envs.errors import MotionError
 from murmillo.envs.motion.clip import Clip, check_clip
+from murmillo.envs.motion.formats.conventions import RawMotion, settle
 from murmillo.envs.motion.formats.npy import split_npy
+from murmillo.envs.motion.formats.options import ReadOptions
+from murmillo.envs.motion.formats.recording import Recording, Skeleton
 from murmillo.envs.motion.formats.safe_unpickle import read_pickle
 
 _Floats = NDArray[np.float64]
@@ -39,14 +43,7 @@ def read_poselib(data: bytes, file: Path, character: Character, weight: float = 
     Raises:
         MotionError: not such a file, damaged, of another skeleton, or asking for code to be run.
     """
-    descr, shape, payload = split_npy(data, str(file))
-    if (descr, shape) != ("|O", ()):
-        raise MotionError(f"{file}: holds an array {list(shape)} of {descr}, no poselib motion; export it with poselib")
-    motion = read_pickle(payload, str(file))
-    if not isinstance(motion, dict):
-        raise MotionError(f"{file}: holds no dictionary and so no poselib motion; export it with poselib")
-    if motion.get("is_local") is not True:
-        raise MotionError(f"{file}: its rotations are not local (is_local); export local rotations")
+    motion = _read_motion(data, file)
     order = _body_order(motion, file, character)
     rotation = _array(motion, "rotation.arr", file, (None, len(order), 4))[:, order]
     _check_norms(rotation, file, character)
@@ -54,9 +51,8 @@ def read_poselib(data: bytes, file: Path, character: Character, weight: float = 
     fps = motion.get("fps")
     if not isinstance(fps, (int, float)):
         raise MotionError(f"{file}: fps is missing; give the frames a second of the recording")
-    name = file.stem.removesuffix(_SUFFIX).removeprefix(_PREFIX)
-    # the files do not say whose they are; the prefix is that of Reallusion's clips
-    source, licence = _REALLUSION if file.stem.startswith(_PREFIX) else _UNKNOWN
+    name = _short(file.stem)
+    source, licence = _origin(file)
     quats = dict(zip(character.bodies, np.roll(rotation, 1, axis=-1).swapaxes(0, 1), strict=True))
     clip = Clip(
         name=name,
@@ -70,6 +66,57 @@ def read_poselib(data: bytes, file: Path, character: Character, weight: float = 
         weight=weight,
     )
     return check_clip(clip, character)
+
+
+def read_poselib_recording(data: bytes, file: Path, options: ReadOptions) -> Recording:
+    """The recording in the bytes of a poselib .npy file, whatever its skeleton; nothing in it is run.
+
+    Raises:
+        MotionError: not such a file, damaged, or asking for code to be run.
+    """
+    motion = _read_motion(data, file)
+    tree = motion.get("skeleton_tree")
+    names = tree.get("node_names") if isinstance(tree, dict) else None
+    if not isinstance(names, list) or not all(isinstance(name, str) and name.isprintable() for name in names):
+        raise MotionError(f"{file}: skeleton_tree.node_names is missing; export it with poselib")
+    if not names or len(set(names)) != len(names):
+        raise MotionError(f"{file}: its skeleton has no names, or the same twice; export it anew")
+    parents = _array(motion, "skeleton_tree.parent_indices.arr", file, (len(names),))
+    if parents[0] != -1.0 or any(parent not in range(joint) for joint, parent in enumerate(parents[1:], start=1)):
+        raise MotionError(f"{file}: a joint comes before its parent; export it anew with the root first")
+    offsets = _array(motion, "skeleton_tree.local_translation.arr", file, (len(names), 3)).copy()
+    offsets[0] = 0.0
+    rotation = _array(motion, "rotation.arr", file, (None, len(names), 4))
+    root_pos = _array(motion, "root_translation.arr", file, (len(rotation), 3))
+    fps = motion.get("fps") if options.fps is None else options.fps
+    if not isinstance(fps, (int, float)):
+        raise MotionError(f"{file}: fps is missing; give the recording's with fps=")
+    skeleton = Skeleton(tuple(names), tuple(int(parent) for parent in parents), offsets)
+    raw = RawMotion(skeleton, root_pos, np.roll(rotation, 1, axis=-1), float(fps), up="z", unit=1.0)
+    recording = settle(raw, file, options)
+    source, licence = _origin(file)
+    return replace(recording, name=_short(recording.name) or recording.name, source=source, licence=licence)
+
+
+def _short(stem: str) -> str:
+    return stem.removesuffix(_SUFFIX).removeprefix(_PREFIX)
+
+
+def _origin(file: Path) -> tuple[str, str]:
+    """Source and licence; the files do not say, but the prefix is that of Reallusion's clips."""
+    return _REALLUSION if file.stem.startswith(_PREFIX) else _UNKNOWN
+
+
+def _read_motion(data: bytes, file: Path) -> dict[str, Any]:
+    descr, shape, payload = split_npy(data, str(file))
+    if (descr, shape) != ("|O", ()):
+        raise MotionError(f"{file}: holds an array {list(shape)} of {descr}, no poselib motion; export it with poselib")
+    motion = read_pickle(payload, str(file))
+    if not isinstance(motion, dict):
+        raise MotionError(f"{file}: holds no dictionary and so no poselib motion; export it with poselib")
+    if motion.get("is_local") is not True:
+        raise MotionError(f"{file}: its rotations are not local (is_local); export local rotations")
+    return motion
 
 
 def _array(motion: dict[str, Any], place: str, file: Path, shape: tuple[int | None, ...]) -> _Floats:

@@ -5,6 +5,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from murmillo.envs.motion.formats.quaternions import multiply, rotate
+
 _Floats = NDArray[np.float64]
 
 
@@ -56,3 +58,28 @@ class Recording:
     def frames(self) -> int:
         """Number of frames F."""
         return len(self.quat)
+
+    @property
+    def duration(self) -> float:
+        """Seconds from the first frame to the last."""
+        return (self.frames - 1) / self.fps
+
+    def global_pose(self) -> tuple[_Floats, _Floats]:
+        """Position [F, J, 3] [m] and rotation [F, J, 4] wxyz of every joint in the world."""
+        return global_pose(self.skeleton, self.root_pos_w, self.quat)
+
+
+def global_pose(skeleton: Skeleton, root_pos_w: _Floats, quat: _Floats) -> tuple[_Floats, _Floats]:
+    """Forward kinematics: position [F, J, 3] and rotation [F, J, 4] wxyz of every joint in the world.
+
+    Args:
+        root_pos_w: [F, 3], in the skeleton's unit.
+        quat: [F, J, 4] in the parent's frame, the root's in the world.
+    """
+    pos_w = np.empty((*quat.shape[:2], 3))
+    quat_w = np.empty_like(quat)
+    pos_w[:, 0], quat_w[:, 0] = root_pos_w, quat[:, 0]
+    for joint, parent in enumerate(skeleton.parents[1:], start=1):
+        pos_w[:, joint] = pos_w[:, parent] + rotate(quat_w[:, parent], skeleton.offsets[joint])
+        quat_w[:, joint] = multiply(quat_w[:, parent], quat[:, joint])
+    return pos_w, quat_w

@@ -12,7 +12,8 @@ import pytest
 from murmillo.envs.character import Character, load_character
 from murmillo.envs.motion import Clip
 
-RECORDINGS = Path(__file__).parents[4] / "shared" / "motions" / "sword_shield_ase"
+SHARED = Path(__file__).parents[4] / "shared" / "motions"
+RECORDINGS = SHARED / "sword_shield_ase"
 
 
 @pytest.fixture(scope="session")
@@ -26,6 +27,14 @@ def recordings() -> Path:
     if not RECORDINGS.is_dir():
         pytest.skip("needs the clips of ASE in ../shared/motions/sword_shield_ase")
     return RECORDINGS
+
+
+@pytest.fixture(scope="session")
+def shared_motions() -> Path:
+    """The folder of recordings in many formats."""
+    if not SHARED.is_dir():
+        pytest.skip("needs the recordings in ../shared/motions")
+    return SHARED
 
 
 def random_qpos(character: Character, frames: int, seed: int) -> np.ndarray:
