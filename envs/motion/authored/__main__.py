@@ -1,6 +1,6 @@
 """Makes the built-in clips, measures them and draws them:
 
-python -m murmillo.envs.motion.authored [--out FOLDER] [--sheet FOLDER]
+python -m murmillo.envs.motion.authored [--character NAME] [--out FOLDER] [--sheet FOLDER]
 """
 
 import argparse
@@ -15,37 +15,45 @@ from murmillo.envs.character import load_character
 from murmillo.envs.errors import SuiteError
 from murmillo.envs.motion import Clip, save_clips
 from murmillo.envs.motion.authored.generate import generate
-from murmillo.envs.motion.authored.sheet import draw
 from murmillo.envs.motion.authored.skills import SKILLS
+from murmillo.envs.motion.authored.styles import GAITS
 from murmillo.envs.motion.measures import Measures, measure
+from murmillo.envs.motion.preview import contact_sheet
 
-SHIPPED = Path(__file__).resolve().parents[3] / "assets" / "motions" / "sword_shield"
+SHIPPED = Path(__file__).resolve().parents[3] / "assets" / "motions"
+PACKS = {"sword_shield": SKILLS, "humanoid": GAITS}
 COLUMNS = ("s", "slide", "lowest", "limits", "speed", "jump", "tracked", "closure")
 UNITS = "slide [cm a frame], lowest [cm], limits [rad], speed and jump [rad/s], tracked [%], closure [rad]"
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Make every skill; the clips are written together at the end."""
+    """Make the packs; the clips of each are written together, once all of them are made."""
     parser = argparse.ArgumentParser("python -m murmillo.envs.motion.authored", description="Make the built-in clips.")
-    parser.add_argument("--out", type=Path, default=SHIPPED, help="folder of the clips (default: the shipped one)")
-    parser.add_argument("--sheet", type=Path, help="folder for a contact sheet of each clip (PNG)")
+    parser.add_argument("--character", choices=("all", *PACKS), default="all", help="whose clips (default: all)")
+    parser.add_argument(
+        "--out", type=Path, default=SHIPPED, help="holds a folder a character (default: the shipped one)"
+    )
+    parser.add_argument("--sheet", type=Path, help="likewise for a contact sheet of each clip (PNG)")
     options = parser.parse_args(arguments)
+    for name in PACKS if options.character == "all" else (options.character,):
+        _make_pack(name, options.out / name, options.sheet and options.sheet / name)
 
-    character = load_character("sword_shield")
+
+def _make_pack(name: str, folder: Path, sheets: Path | None) -> None:
+    character, clips = load_character(name), []
     table = Table(title=UNITS)
-    for column in ("clip", *COLUMNS):
-        table.add_column(column, justify="left" if column == "clip" else "right")
-    clips = []
-    for skill in SKILLS:
+    for column in (name, *COLUMNS):
+        table.add_column(column, justify="left" if column == name else "right")
+    for skill in PACKS[name]:
         clip = generate(skill(), character)
         clips.append(clip)
         table.add_row(*_row(clip, measure(clip, character)))
-        if options.sheet:
-            draw(clip, character, options.sheet / f"{clip.name}.png")
-    save_clips(options.out, clips)
+        if sheets:
+            contact_sheet(clip, character, sheets / f"{clip.name}.png")
+    save_clips(folder, clips)
     console = Console()
     console.print(table)
-    console.print(f"{len(clips)} clips, {sum(clip.duration for clip in clips):.1f} s, written to {options.out}")
+    console.print(f"{len(clips)} clips, {sum(clip.duration for clip in clips):.1f} s, written to {folder}")
 
 
 def _row(clip: Clip, m: Measures) -> list[str]:

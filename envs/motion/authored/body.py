@@ -9,9 +9,10 @@ import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from murmillo.envs.motion.authored.limits import BALL_LIMITS, KNEE_SLACK
+from murmillo.envs.character import joint_box
 
 SOLVER = "daqp"
+KNEE_SLACK = 0.10  # the knees never straighten beyond this [rad]
 FootTargets = dict[str, tuple[np.ndarray, Rotation]]  # of each side: ankle position [m] and foot rotation, world
 POSE_STEPS, FOLLOW_STEPS = 60, 6  # Gauss-Newton steps a key pose and a frame take
 CHEST_TO_NECK = 0.2239  # torso origin to the base of the neck [m]
@@ -60,13 +61,13 @@ def shield_rotation(azimuth: float, elevation: float, slope: float) -> Rotation:
 
 
 class BallBox(mink.Limit):
-    """Keeps the exponential map of each ball joint inside the published boxes (degrees about x, y, z)."""
+    """Keeps the exponential map of each ball joint inside its box."""
 
     def __init__(self, model: mujoco.MjModel, gain: float = 0.9) -> None:
         self._gain = gain
+        balls = (model.joint(i) for i in range(model.njnt) if model.jnt_type[i] == mujoco.mjtJoint.mjJNT_BALL)
         self._joints = [
-            (int(joint.qposadr[0]), int(joint.dofadr[0]), *np.radians(np.array(box, float).T))
-            for joint, box in ((model.joint(name), box) for name, box in BALL_LIMITS.items())
+            (int(joint.qposadr[0]), int(joint.dofadr[0]), *joint_box(model, joint.name).T) for joint in balls
         ]
 
     def compute_qp_inequalities(self, configuration: mink.Configuration, dt: float) -> mink.Constraint:
@@ -158,6 +159,16 @@ class Puppet:
         for _ in range(FOLLOW_STEPS):
             self._step(tasks, damping=1e-4)
         return self._configuration.q.copy()
+
+    def centres_of_mass(self, qpos: np.ndarray) -> np.ndarray:
+        """Of the whole body in the poses qpos [F, nq]: [F, 3] [m]."""
+        model, data = self._configuration.model, self._configuration.data
+        centres = np.empty((len(qpos), 3))
+        for centre, data.qpos in zip(centres, qpos, strict=True):
+            mujoco.mj_kinematics(model, data)
+            mujoco.mj_comPos(model, data)
+            centre[:] = data.subtree_com[1]
+        return centres
 
     def start_from(self, qpos: np.ndarray) -> None:
         """Make `qpos` [nq] the state from which the next solution is sought."""

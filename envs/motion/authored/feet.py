@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 from murmillo.envs.motion.authored.timing import bump, minimum_jerk, swing, through_keys
@@ -13,6 +14,7 @@ SOLE = 0.05  # ankle above the sole [m]
 TOE = np.array([0.1335, 0.0, -SOLE])  # front edge of the sole, foot frame [m]
 HEEL = np.array([-0.0435, 0.0, -SOLE])  # rear edge
 CENTRE = np.array([0.045, 0.0, -SOLE])  # middle of the sole
+TOUCHDOWN = (1.0, -0.9)  # forward and upward speed of a running foot as it lands [m/s]
 
 
 @dataclass(frozen=True)
@@ -31,6 +33,7 @@ class Step:
     `lift` is the clearance at mid-swing [m]. Before leaving, the heel rises by `push` [deg] over the toe edge in
     `push_time`; the foot lands on the heel with the toes up by `strike` [deg] and is flat `flat_time` later.
     `via` are places of the foot in the air, (time, x, y, height above the ground, yaw, toes-down pitch [deg]): a kick.
+    `flow` are places of the ankle, (time, x, y, z, toes-down pitch [deg]), that it swings through without pause: a run.
     """
 
     foot: str
@@ -43,11 +46,13 @@ class Step:
     strike: float = 0.0
     flat_time: float = 0.10
     via: tuple[tuple[float, ...], ...] = ()
+    flow: tuple[tuple[float, ...], ...] = ()
 
 
 @dataclass(frozen=True)
 class FootPath:
-    """One foot over time: ankle [F, 3] [m], its rotation, middle of the sole [F, 2] [m], whether it is planted [F]."""
+    """One foot over time: ankle [F, 3] [m], its rotation, the middle of what carries it [F, 2] [m], whether it is
+    planted [F]."""
 
     ankle: np.ndarray
     rotation: Rotation
@@ -71,17 +76,20 @@ def foot_path(foot: str, start: Place, steps: Sequence[Step], time: np.ndarray) 
         planted &= (time <= step.start) | (time >= step.end)
         place = step.place
     rotation = Rotation.from_euler("ZY", np.stack([yaw, pitch], -1), degrees=True)
-    upright = Rotation.from_euler("Z", yaw[:, None], degrees=True)
     # Rolling is about the edge that stays on the ground, so the ankle moves and the edge does not.
-    edge = np.where(pitch[:, None] > 0.0, TOE, HEEL)
-    position = position + upright.apply(edge) - rotation.apply(edge)
-    return FootPath(position, rotation, (position + rotation.apply(CENTRE))[:, :2], planted)
+    position = position + _rolled(yaw, pitch)
+    # With the heel well up, the toes carry.
+    onto_toes = np.clip((pitch[:, None] - 15.0) / 15.0, 0.0, 1.0)
+    pressed = position + rotation.apply(CENTRE + onto_toes * (TOE - CENTRE))
+    return FootPath(position, rotation, pressed[:, :2], planted)
 
 
 def _take(
     step: Step, place: Place, time: np.ndarray, position: np.ndarray, yaw: np.ndarray, pitch: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Write one step over the path from its push-off on; the positions are of the ankle as if the foot were flat."""
+    if step.flow:
+        return _swing_through(step, place, time, position, yaw, pitch)
     phase = (time - step.start) / (step.end - step.start)
     progress = swing(phase)
     there = np.array([step.place.x, step.place.y, SOLE])
@@ -109,3 +117,38 @@ def _through_air(step: Step, place: Place, time: np.ndarray) -> np.ndarray:
     keys += [(step.end, step.place.x, step.place.y, SOLE, step.place.yaw, 0.0)]
     table = np.array(keys)
     return through_keys(table[:, 0], table[:, 1:], time)
+
+
+def _swing_through(
+    step: Step, place: Place, time: np.ndarray, position: np.ndarray, yaw: np.ndarray, pitch: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Write a step that flows: the toes leave and the heel lands at the speed at which the foot rolls on the ground."""
+    flow = np.array(step.flow)
+    when = np.concatenate([[step.start], flow[:, 0], [step.end]])
+    table = np.empty((len(when), 4))  # x, y and z of the ankle as if the foot were flat, and pitch
+    table[0] = place.x, place.y, SOLE, step.push
+    table[-1] = step.place.x, step.place.y, SOLE, -step.strike
+    yaw_there = through_keys(when[[0, -1]], np.array([[place.yaw], [step.place.yaw]]), when)[:, 0]
+    table[1:-1] = np.column_stack([flow[:, 1:4] - _rolled(yaw_there[1:-1], flow[:, 4]), flow[:, 4]])
+    leaving, landing = 2.0 * step.push / step.push_time, 2.0 * step.strike / step.flat_time
+    way = table[-1, :2] - table[0, :2]
+    touchdown = np.array([*(TOUCHDOWN[0] * way / np.linalg.norm(way)), TOUCHDOWN[1], landing])
+    slopes = ((1, np.array([0.0, 0.0, 0.0, leaving])), (1, touchdown))
+    spline = CubicSpline(when, table, bc_type=slopes)  # pyright: ignore[reportArgumentType]  (its stub knows names only)
+    air = spline(np.clip(time, step.start, step.end))
+
+    rolling = np.clip((time - step.start) / step.push_time + 1.0, 0.0, 1.0) ** 2
+    settling = np.clip(1.0 - (time - step.end) / step.flat_time, 0.0, 1.0) ** 2
+    inside, after = (time > step.start) & (time < step.end), time >= step.end
+    position = np.where((inside | after)[:, None], air[:, :3], position)
+    turned = through_keys(when[[0, -1]], yaw_there[[0, -1], None], time)[:, 0]
+    yaw = np.where(inside | after, turned, yaw)
+    pitch = np.where(inside, air[:, 3], pitch + step.push * np.where(time <= step.start, rolling, 0.0))
+    return position, yaw, np.where(after, -step.strike * settling, pitch)
+
+
+def _rolled(yaw: np.ndarray, pitch: np.ndarray) -> np.ndarray:
+    """How far the ankle moves [F, 3] when a foot of `yaw` rolls by `pitch` [deg] over the edge on the ground."""
+    rotation = Rotation.from_euler("ZY", np.stack([yaw, pitch], -1), degrees=True)
+    edge = np.where(pitch[:, None] > 0.0, TOE, HEEL)
+    return Rotation.from_euler("Z", yaw[:, None], degrees=True).apply(edge) - rotation.apply(edge)

@@ -1,6 +1,7 @@
 """What the body does without a weapon."""
 
 from murmillo.envs.motion.authored.feet import Step
+from murmillo.envs.motion.authored.skills.footwork import recovered
 from murmillo.envs.motion.authored.skills.guard_pose import GUARD, RIGHT
 from murmillo.envs.motion.authored.take import Key, Take
 
@@ -26,32 +27,39 @@ def kick() -> Take:
         shield=(0.20, 0.36, -0.08),
         face=(52.0, 0.0, 35.0),
     )
+    gathered = GUARD.but(
+        height=0.742,
+        weight=0.18,
+        hips=(-18.0, 6.0, -1.0),
+        chest=(-30.0, 9.0, -1.0),
+        hand=(0.14, -0.29, -0.27),
+        shield=(0.34, 0.08, -0.14),
+    )
     return Take(
         "kick",
         [
             Key(0.0, GUARD),
-            Key(0.45, GUARD.but(weight=0.1, height=0.775, hips=(-10.0, 3.0, 0.0))),
-            Key(0.82, lifted),
-            Key(1.02, thrust),
-            Key(1.12, thrust),
-            Key(1.40, lifted.but(weight=0.05)),
-            Key(1.95, GUARD.but(weight=0.54, height=0.758)),
-            Key(2.5, GUARD),
-            Key(2.8, GUARD),
+            Key(0.40, gathered),
+            Key(0.84, lifted),
+            Key(1.04, thrust),
+            Key(1.15, thrust),
+            Key(1.46, lifted.but(weight=0.05)),
+            Key(2.02, recovered(0.54)),
+            Key(2.6, GUARD),
         ],
         [
             Step(
                 "right",
-                0.52,
-                1.82,
+                0.50,
+                1.88,
                 RIGHT,
                 via=(
-                    (0.68, -0.10, -0.09, 0.20, -16.0, 28.0),
-                    (0.84, 0.14, -0.05, 0.44, -2.0, 0.0),
-                    (1.06, 0.88, 0.00, 0.62, 0.0, -35.0),
-                    (1.13, 0.88, 0.00, 0.61, 0.0, -35.0),
-                    (1.34, 0.16, -0.05, 0.38, -4.0, 0.0),
-                    (1.58, -0.12, -0.10, 0.12, -28.0, 10.0),
+                    (0.66, -0.12, -0.09, 0.17, -18.0, 28.0),
+                    (0.84, 0.12, -0.05, 0.44, -2.0, 4.0),
+                    (1.06, 0.88, 0.00, 0.62, 0.0, -28.0),
+                    (1.15, 0.88, 0.00, 0.61, 0.0, -28.0),
+                    (1.40, 0.16, -0.05, 0.38, -4.0, 0.0),
+                    (1.66, -0.14, -0.10, 0.10, -30.0, 8.0),
                 ),
             ),
         ],
