@@ -11,12 +11,13 @@ murmillo: simulated sword-and-shield fighters that learn skills from motion clip
   murmillo train      train an agent and leave a report, a video and checkpoints in runs/<name>/
   murmillo evaluate   measure a trained agent:       murmillo evaluate run=runs/<name>
   murmillo record     film a trained agent:          murmillo record run=runs/<name>
+  murmillo motions    import motion clips, look at them, label them
   murmillo doctor     look at this machine: versions, graphics, threads, GPU, speed
 
 `murmillo <command> --help` says what a command takes. Settings are written name=value.
 """
 
-COMMANDS = ("train", "evaluate", "record", "doctor")
+COMMANDS = ("train", "evaluate", "record", "motions", "doctor")
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -39,6 +40,8 @@ def _run(name: str, words: list[str]) -> int:
     if name not in COMMANDS:
         raise CommandError(f"there is no command {name!r}; {near_names(name, list(COMMANDS))}")
     module = importlib.import_module(f"murmillo.cli.{name}")
+    if hasattr(module, "choose"):  # it has commands of its own
+        module, words = module.choose(words)
     if "--help" in words or "-h" in words:
         print(module.HELP, end="")
         return 0

@@ -34,6 +34,7 @@ class Clip:
         loop: whether the last frame leads into the first.
         masked: key bodies that the source had not, such as sword and shield: what the clip shows of them is made up,
             and no discriminator should judge by it.
+        origin: SHA-256 of the file that it was imported from, in hexadecimal; empty where there is none.
 
     Raises:
         MotionError: a rate, a frame or a weight that no clip can have.
@@ -50,6 +51,7 @@ class Clip:
     weight: float = 1.0
     loop: bool = False
     masked: tuple[str, ...] = ()
+    origin: str = ""
 
     def __post_init__(self) -> None:
         if not all(text and text.isprintable() for text in (self.name, self.label)):

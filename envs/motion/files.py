@@ -51,7 +51,10 @@ def load_clips(path: str | Path, character: Character) -> list[Clip]:
         return read_clips(path.parent, character, only=path.name)
     if suffix in _YAML:
         return _load_poselib(_read_dataset(path), character)
-    raise MotionError(f"motions={path}: files of type {suffix or '(none)'} are unknown; known are .npy, .npz and .yaml")
+    raise MotionError(
+        f"motions={path}: files of type {suffix or '(none)'} are unknown; known are .npy, .npz and .yaml, and "
+        "`murmillo motions import` makes clips of others"
+    )
 
 
 def _load_builtin(character: Character) -> list[Clip]:
@@ -68,7 +71,9 @@ def _load_folder(folder: Path, character: Character) -> list[Clip]:
         return read_clips(folder, character)
     clips = {file: 1.0 for file in files if file.suffix.lower() == ".npy"}
     if not clips:
-        raise MotionError(f"motions={folder}: holds neither {MANIFEST} nor .npy clips; give a folder with clips")
+        raise MotionError(
+            f"motions={folder}: holds neither {MANIFEST} nor .npy clips; make clips with `murmillo motions import`"
+        )
     datasets = {file: _read_dataset(file) for file in files if file.suffix.lower() in _YAML}
     if not datasets:
         return _load_poselib(clips, character)

@@ -1,6 +1,7 @@
 """A library of clips as tensors: sampling, poses at any time, and windows of the state for discriminators."""
 
 from collections.abc import Sequence
+from difflib import get_close_matches
 from itertools import accumulate
 
 import torch
@@ -56,11 +57,14 @@ class MotionLibrary:
         counts = torch.bincount(self.clip_skill, minlength=len(self.skills))
         self._skill_ends = torch.cat((torch.zeros_like(counts[:1]), torch.cumsum(counts, 0)))
 
-    def sample(self, n: int, generator: torch.Generator, skill: Tensor | None = None) -> tuple[Tensor, Tensor]:
+    def sample(
+        self, n: int, generator: torch.Generator, skill: Tensor | None = None, span: float = 0.0
+    ) -> tuple[Tensor, Tensor]:
         """Draw n moments: a clip by its weight, a time uniform in its duration.
 
         Args:
             skill: [n] int64 indices into `skills`; each draw is then among the clips of its skill.
+            span: [s] that the clip has behind it at each moment, or all that it has where it is shorter.
 
         Returns:
             clip [n] int64 and time [n] float64 [s].
@@ -82,7 +86,8 @@ class MotionLibrary:
         point = low + u * (self._cumulative[after - 1] - low)
         index = torch.searchsorted(self._cumulative, point, right=True)
         clip = self._by_skill[torch.minimum(torch.maximum(index, first), after - 1)]
-        return clip, v * self.duration[clip]
+        first_time = self.duration[clip].clamp_max(span)
+        return clip, first_time + v * (self.duration[clip] - first_time)
 
     def pose(self, clip: Tensor, time: Tensor) -> tuple[Tensor, Tensor]:
         """Poses and velocities at these moments.
@@ -109,6 +114,21 @@ class MotionLibrary:
         for columns, rotation in zip(self._quat_columns, quat.unbind(1), strict=True):
             qpos[:, columns] = rotation
         return qpos, self._qvel.index_select(0, below)
+
+    def middle(self, names: Sequence[str], frames: int) -> Tensor:
+        """The windows in the middle of the clips of these names, `[n, frames, D]` as `window` gives them.
+
+        Raises:
+            MotionError: a name that no clip has.
+        """
+        known = [clip.name for clip in self.clips]
+        for name in names:
+            if name not in known:
+                near = ", ".join(get_close_matches(name, known, n=4, cutoff=0.0))
+                raise MotionError(f"clip {name}: there is none of that name; near it are: {near}")
+        clip = torch.tensor([known.index(name) for name in names], device=self.device)
+        half = 0.5 * (frames - 1) * CONTROL_DT
+        return self.window(clip, torch.minimum(0.5 * self.duration[clip] + half, self.duration[clip]), frames)
 
     def window(self, clip: Tensor, time: Tensor, frames: int) -> Tensor:
         """Windows of the state that end at these moments.

@@ -2,9 +2,11 @@
 
 {"format": "murmillo-clips/1", "character": "sword_shield", "clips": [
   {"file": "walk.npz", "name": "walk", "label": "walk", "fps": 30.0, "frames": 61, "loop": true, "source": "...",
-   "licence": "...", "redistributable": true, "weight": 1.0, "masked": [], "sha256": "..."}]}
+   "licence": "...", "redistributable": true, "weight": 1.0, "masked": [], "origin": "...",
+   "sha256": "..."}]}
 
-Manifests written before clips could be masked lack that field.
+`sha256` is that of the clip's own file, `origin` that of the file that it was imported from. Manifests written before
+clips could be masked or told their origin lack these fields.
 """
 
 import json
@@ -18,7 +20,7 @@ MANIFEST = "manifest.json"
 _FORMAT = "murmillo-clips/1"
 _NUMBER = (int, float)
 _PLAIN_NAME = re.compile(r"[\w().-]+\.npz", re.ASCII)
-_OPTIONAL = {"masked"}
+_OPTIONAL = {"masked", "origin"}
 _FIELDS: dict[str, type | tuple[type, ...]] = {
     "file": str,
     "name": str,
@@ -31,6 +33,7 @@ _FIELDS: dict[str, type | tuple[type, ...]] = {
     "redistributable": bool,
     "weight": _NUMBER,
     "masked": list,
+    "origin": str,
     "sha256": str,
 }
 
@@ -49,6 +52,7 @@ def entry_of(clip: Clip, file: str, sha256: str) -> dict[str, Any]:
         "redistributable": clip.redistributable,
         "weight": clip.weight,
         "masked": list(clip.masked),
+        "origin": clip.origin,
         "sha256": sha256,
     }
 

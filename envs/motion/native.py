@@ -11,6 +11,7 @@ import tempfile
 import zipfile
 import zlib
 from collections.abc import Sequence
+from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
@@ -41,11 +42,7 @@ def save_clips(folder: str | Path, clips: Sequence[Clip]) -> None:
         raise MotionError(f"{folder}: clips of several characters ({', '.join(characters)}); save each on its own")
     contents: dict[str, bytes] = {}
     entries = []
-    for clip in clips:
-        file = re.sub(r"[^\w().-]", "_", clip.name, flags=re.ASCII) + ".npz"
-        # some file systems do not tell upper from lower case
-        if file.lower() in (other.lower() for other in contents):
-            raise MotionError(f"{folder}: two clips would be the file {file}; give each clip a name of its own")
+    for clip, file in zip(clips, _file_names(folder, clips), strict=True):
         contents[file] = _pack(clip.qpos)
         entries.append(entry_of(clip, file, hashlib.sha256(contents[file]).hexdigest()))
     contents[MANIFEST] = write_manifest(characters[0], entries)
@@ -53,6 +50,19 @@ def save_clips(folder: str | Path, clips: Sequence[Clip]) -> None:
         _replace_folder(Path(folder).absolute(), contents)
     except OSError as error:
         raise MotionError(f"{folder}: cannot be written ({error.strerror or error}); choose another folder") from None
+
+
+def _file_names(folder: str | Path, clips: Sequence[Clip]) -> list[str]:
+    """A plain name for the file of each clip; names that differ in foreign letters alone are told apart by numbers."""
+    files: dict[str, str] = {}  # by the clip's name; some file systems do not tell upper from lower case
+    for clip in clips:
+        stem = re.sub(r"[^\w().-]", "_", clip.name, flags=re.ASCII)
+        if clip.name.casefold() in files:
+            raise MotionError(f"{folder}: two clips would be the file {stem}.npz; give each clip a name of its own")
+        candidates = chain([f"{stem}.npz"], (f"{stem}-{number}.npz" for number in count(2)))
+        taken = {file.lower() for file in files.values()}
+        files[clip.name.casefold()] = next(file for file in candidates if file.lower() not in taken)
+    return list(files.values())
 
 
 def _pack(qpos: NDArray[np.float64]) -> bytes:
@@ -68,13 +78,33 @@ def _pack(qpos: NDArray[np.float64]) -> bytes:
     return packed.getvalue()
 
 
-def _replace_folder(folder: Path, contents: dict[str, bytes]) -> None:
-    """Write the files beside the folder, then rename; whatever fails leaves the folder as it was."""
+def check_destination(folder: str | Path) -> None:
+    """Refuse, before work is done for it, a folder that `save_clips` could not write.
+
+    Raises:
+        MotionError: it cannot be written, or holds anything else than saved clips.
+    """
+    path = Path(folder).absolute()
+    try:
+        _refuse_foreign(path)
+        nearest = next(parent for parent in path.parents if parent.exists())
+        with tempfile.TemporaryDirectory(prefix=f".{path.name}.", dir=nearest):
+            pass
+    except OSError as error:
+        raise MotionError(f"{folder}: cannot be written ({error.strerror or error}); choose another folder") from None
+
+
+def _refuse_foreign(folder: Path) -> None:
     if folder.exists():
         old = [entry.name for entry in folder.iterdir()]
         foreign = [name for name in old if name != MANIFEST and not name.endswith(".npz")]
         if foreign or (old and MANIFEST not in old):
             raise MotionError(f"{folder}: holds other files than saved clips; choose a new or an empty folder")
+
+
+def _replace_folder(folder: Path, contents: dict[str, bytes]) -> None:
+    """Write the files beside the folder, then rename; whatever fails leaves the folder as it was."""
+    _refuse_foreign(folder)
     folder.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=f".{folder.name}.", dir=folder.parent) as beside:
         new, replaced = Path(beside, "new"), Path(beside, "replaced")
@@ -132,6 +162,7 @@ def _read_clip(file: Path, entry: dict[str, Any], character: str) -> Clip:
         weight=float(entry["weight"]),
         loop=entry["loop"],
         masked=tuple(entry.get("masked", ())),
+        origin=entry.get("origin", ""),
     )
 
 
@@ -140,7 +171,7 @@ def _unpack(data: bytes, file: Path) -> bytes:
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             member = archive.getinfo(_MEMBER)
-            if member.file_size <= len(data):
+            if member.compress_type == zipfile.ZIP_STORED and member.file_size <= len(data):
                 return archive.read(member)
     except (zipfile.BadZipFile, LookupError, ValueError, RuntimeError, EOFError, OSError, struct.error, zlib.error):
         raise MotionError(f"{file}: is no .npz with an array qpos, or is damaged; copy the file anew") from None

@@ -154,3 +154,20 @@ def test_mask_says_which_features_a_clip_made_up(make_clip, character):
     library = MotionLibrary([make_clip("one"), make_clip("two", masked=("shield",))], character)
     assert library.mask.sum(-1).tolist() == [0, 3]
     assert MotionLibrary([make_clip("one")], character).mask is None
+
+
+def test_a_span_lies_within_the_clip_where_it_is_long_enough(make_clip, character):
+    library = MotionLibrary([make_clip("short", frames=11), make_clip("long", frames=91)], character)
+    clip, time = library.sample(400, torch.Generator().manual_seed(0), span=1.0)
+    assert (time[clip == 0] == library.duration[0]).all()
+    assert time[clip == 1].min() >= 1.0
+    assert time[clip == 1].max() > 2.8
+
+
+def test_the_middle_of_a_clip(make_clip, character):
+    library = MotionLibrary([make_clip("short", frames=11), make_clip("long", frames=91)], character)
+    window = library.middle(["long", "short"], 31)
+    torch.testing.assert_close(window[:1], library.window(torch.tensor([1]), torch.tensor([2.0]), 31))
+    torch.testing.assert_close(window[1:], library.window(torch.tensor([0]), library.duration[:1], 31))
+    with pytest.raises(MotionError, match="clip lang: there is none of that name; near it are: long"):
+        library.middle(["lang"], 31)
