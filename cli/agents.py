@@ -5,12 +5,14 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import torch
-from torch import Tensor
 
 from murmillo.agents.ase.agent import ASE
 from murmillo.agents.ase.config import ASEConfig
+from murmillo.agents.calm.agent import CALM
+from murmillo.agents.calm.config import CALMConfig
+from murmillo.agents.case.agent import CASE
+from murmillo.agents.case.config import CASEConfig
 from murmillo.agents.common import checkpoint
-from murmillo.agents.common.latents import sample_sphere
 from murmillo.envs import HumanoidVectorEnv
 from murmillo.envs.observations import state_dim
 
@@ -20,16 +22,21 @@ class AgentKind(NamedTuple):
 
     Attributes:
         config: its configuration.
-        make: from environment, demonstrations, configuration and generator.
-        condition: draws what its policy is told, [n, C], for the warm start.
+        make: from environment, demonstrations, configuration and generator; the agent's `random_condition(n)` draws
+            what its policy is told, for the warm start.
+        labelled: it is told the skill, so that a checkpoint belongs to one list of skills.
     """
 
     config: type
     make: Callable[..., Any]
-    condition: Callable[[Any, int, torch.Generator], Tensor | None]
+    labelled: bool = False
 
 
-AGENTS = {"ase": AgentKind(ASEConfig, ASE, lambda config, n, generator: sample_sphere(n, config.latent_dim, generator))}
+AGENTS = {
+    "ase": AgentKind(ASEConfig, ASE),
+    "case": AgentKind(CASEConfig, CASE, labelled=True),
+    "calm": AgentKind(CALMConfig, CALM),
+}
 
 
 def make_agent(name: str, config: Any, env: HumanoidVectorEnv, seed: int) -> tuple[Any, torch.Generator]:
@@ -46,6 +53,7 @@ def checkpoint_meta(name: str, config: Any, env: HumanoidVectorEnv) -> dict[str,
         "state_dim": state_dim(env.character),
         "action_dim": _action_dim(env),
         "window": config.window,
+        **({"skills": list(env.skills)} if AGENTS[name].labelled else {}),
     }
 
 

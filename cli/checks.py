@@ -36,6 +36,11 @@ def check_settings(config: TrainConfig) -> None:
             f"env.window={config.env.window}: the agent sees agent.window={config.agent.window} frames; "
             "set agent.window alone"
         )
+    if config.runner.reward_weights.get("residual") and not config.env.residual_force:
+        raise CommandError(
+            f"runner.reward_weights.residual={config.runner.reward_weights['residual']}: there are no residual forces "
+            "to be sparing with; set env.residual_force (50 N are the published code's), or drop this weight"
+        )
     if config.env.autoreset != "same_step":
         raise CommandError(f"env.autoreset={config.env.autoreset}: training needs same_step")
 

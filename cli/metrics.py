@@ -72,4 +72,49 @@ CLIP_SCORE = Metric(
     "the same probability for true clips. The two meet at 0.5 when the judge cannot tell them apart.",
 )
 
-TRAINING = (EPISODE_LENGTH, FALL_RATE, STYLE, SKILL, AGENT_SCORE, CLIP_SCORE)
+COMMANDED = Metric(
+    "heads/agent_right",
+    "Commanded skill's head",
+    "",
+    3,
+    "probability that the discriminator's head of the commanded skill gives to the agent's motion.",
+)
+OTHER_HEADS = Metric(
+    "heads/agent_other",
+    "Other skills' heads",
+    "",
+    3,
+    "the mean that all other heads give to the same motion. Well below the commanded one's: the label is obeyed.",
+)
+RIGHT_LABEL = Metric(
+    "heads/demonstration_right",
+    "Clips under their label",
+    "",
+    3,
+    "probability of true clips by the head of their own label.",
+)
+WRONG_LABEL = Metric(
+    "heads/demonstration_other",
+    "Clips under a wrong label",
+    "",
+    3,
+    "the same by the heads of all other labels. Well below: the discriminator knows the labels apart.",
+)
+MISMATCHED = Metric(
+    "discriminator/agent_mismatched_score",
+    "Agent under another latent",
+    "",
+    3,
+    "probability that the discriminator gives to the agent's motion when it is told that another motion was asked for. "
+    "Well below that on the agent: the character does what its latent says.",
+)
+RESIDUAL = Metric(
+    "reward/residual",
+    "Residual reward",
+    "",
+    3,
+    "for doing without residual forces: 1 without any, towards 0 with strong ones at many joints.",
+)
+
+TRAINING = (EPISODE_LENGTH, FALL_RATE, STYLE, SKILL, RESIDUAL, AGENT_SCORE, CLIP_SCORE, MISMATCHED)
+LABELS = (COMMANDED, OTHER_HEADS, RIGHT_LABEL, WRONG_LABEL)

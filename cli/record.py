@@ -1,5 +1,6 @@
 """`murmillo record`: film a trained agent without a screen."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,8 @@ murmillo record: film a trained agent
   run       needed           folder of the run
   seconds   10               length of the film
   skill     by chance        name of the commanded skill
+  clips     none             CALM: names of clips to follow one after the other, clips=[walk_forward,kick]
+  blend     false            CALM: go from one clip to the next evenly instead of at once
   camera    track            track, side or front
   out       video.mp4        file, in the run's folder unless it is a path
   seed      1                of the start
@@ -31,6 +34,8 @@ class RecordConfig:
     run: str
     seconds: float = 10.0
     skill: str | None = None
+    clips: tuple[str, ...] = ()
+    blend: bool = False
     camera: str = "track"
     out: str = "video.mp4"
     seed: int = 1
@@ -82,11 +87,14 @@ def film(config: Any, folder: Path, settings: RecordConfig, out: Path) -> Path:
         player = load_player(config.choices["agent"], config.agent, env, config.seed, folder / runs.LAST)
         obs, _ = env.reset(seed=settings.seed, options={"start": "reference"})
         _command(env, settings.skill)
+        follow = _follower(settings, player, env)
         first = _frame(env)
         writer: Any = imageio.get_writer(beside, fps=env.metadata["render_fps"], macro_block_size=1)
         with writer:
             writer.append_data(first)
-            for _ in range(round(settings.seconds * env.metadata["render_fps"]) - 1):
+            frames = round(settings.seconds * env.metadata["render_fps"])
+            for frame in range(1, frames):
+                follow(frame / frames)
                 step = player.act(tensors(obs), deterministic=True)
                 obs, _, terminated, truncated, _ = env.step(step.action.numpy())
                 if terminated[0] or truncated[0]:
@@ -98,6 +106,33 @@ def film(config: Any, folder: Path, settings: RecordConfig, out: Path) -> Path:
         beside.unlink(missing_ok=True)
         env.close()
     return out
+
+
+def _follower(settings: RecordConfig, player: Any, env: Any) -> Callable[[float], None]:
+    """Tells the player which clip to follow at a part [0, 1) of the film; does nothing where no clips are asked for.
+
+    Raises:
+        CommandError: the agent follows no clips.
+    """
+    from murmillo.agents.common.latents import interpolate
+
+    if not settings.clips:
+        return lambda part: None
+    if not hasattr(player, "follow"):
+        raise CommandError(
+            f"clips={list(settings.clips)}: this run's agent follows no clips; choose a run of agent=calm"
+        )
+    latents = player.encode(env.library.middle(settings.clips, player.encoder.frames))
+
+    def follow(part: float) -> None:
+        place = part * (len(latents) - 1 if settings.blend else len(latents))
+        number = min(int(place), len(latents) - 1)
+        if settings.blend and number + 1 < len(latents):
+            player.follow(interpolate(latents[number], latents[number + 1], place - number))
+        else:
+            player.follow(latents[number])
+
+    return follow
 
 
 def _command(env: Any, skill: str | None) -> None:

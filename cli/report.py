@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 from omegaconf import OmegaConf
 
-from murmillo.cli import runs
+from murmillo.cli import obedience, runs
 from murmillo.cli.evaluate import AGES
-from murmillo.cli.metrics import TRAINING, Metric
+from murmillo.cli.metrics import LABELS, TRAINING, Metric
 from murmillo.cli.plots import Scalars, plot_all
+from murmillo.envs.motion.licences import Terms
 
 _MAX_ROWS = 12
 
@@ -23,13 +24,16 @@ def write(folder: Path) -> Path:
     sections = [
         f"# {folder.name}",
         _what(config, runs.read_json(folder / runs.VERSIONS, {}), scalars),
+        _terms(runs.read_json(folder / runs.TERMS)),
         _film(folder),
+        _notices(runs.read_json(folder / runs.NOTICES, [])),
         _ages(measures),
+        obedience.section(measures, runs.read_json(folder / runs.SKILLS, {})),
     ]
     if len(scalars["samples"]):
         plots = plot_all(scalars, folder / runs.PLOTS)
         sections += [_first_and_last(scalars), _minutes(scalars), _pictures(plots, folder)]
-    sections += [_meanings(), _going_on(folder)]
+    sections += [_meanings(scalars), _going_on(folder)]
     path = folder / runs.REPORT
     runs.write_text(path, "\n\n".join(section for section in sections if section) + "\n")
     return path
@@ -67,11 +71,28 @@ def _what(config: Any, versions: dict[str, Any], scalars: Scalars) -> str:
     )
 
 
+def _terms(terms: dict[str, Any] | None) -> str:
+    """What the licences of the clips come to for the weights; of runs that have kept them."""
+    return f"Learned from clips under these {Terms(**terms)}" if terms else ""
+
+
 def _film(folder: Path) -> str:
     if (folder / runs.VIDEO).is_file():
         return f"The trained character: [`{runs.VIDEO}`]({runs.VIDEO})"
     reason = runs.read_json(folder / runs.FILMING, {}).get("reason")
     return f"No video: {reason}" if reason else ""
+
+
+def _notices(notices: list[dict[str, Any]]) -> str:
+    """The failures that the runner saw, and whether they are over."""
+    if not notices:
+        return ""
+    lines = []
+    for notice in notices:
+        over = "" if notice["over"] is None else f" (Over at {notice['over']:,}.)"
+        lines.append(f"- At {notice['samples']:,} samples: {notice['text']}.{over}")
+    hint = "`runner.*` can be set when this run is taken up again; all else needs a new run."
+    return "\n".join(["## What to look at", "", *lines, "", hint])
 
 
 def _ages(measures: dict[str, Any]) -> str:
@@ -101,6 +122,12 @@ def _ages(measures: dict[str, Any]) -> str:
             "The warm start, a regression on the clips' own next poses before the first sample, changed the length of "
             f"an episode by {after - before:+.1f} steps.",
         ]
+    if shares := [m["residual_share"] for m in measures.values() if m.get("residual_share") is not None]:
+        text += [
+            "",
+            f"Residual forces: after training, {100 * shares[-1]:.2f} % of the PD control, as the mean L2 norm of all "
+            "residual forces [N] to that of all joint torques [N m] (the paper reports 0.842 %).",
+        ]
     return "\n".join(text)
 
 
@@ -109,8 +136,8 @@ def _mean(values: np.ndarray) -> float:
     return float(known.mean()) if len(known) else float("nan")
 
 
-def _present(scalars: Scalars) -> list[Metric]:
-    return [metric for metric in TRAINING if metric.scalar in scalars]
+def _present(scalars: Scalars, metrics: tuple[Metric, ...] = TRAINING) -> list[Metric]:
+    return [metric for metric in metrics if metric.scalar in scalars]
 
 
 def _first_and_last(scalars: Scalars) -> str:
@@ -120,7 +147,7 @@ def _first_and_last(scalars: Scalars) -> str:
     first, last = seconds <= max(span, seconds[0]), seconds > seconds[-1] - span
     rows = [
         f"| {m.title} | {m.show(_mean(scalars[m.scalar][first]))} | {m.show(_mean(scalars[m.scalar][last]))} |"
-        for m in _present(scalars)
+        for m in _present(scalars, TRAINING + LABELS)
     ]
     return "\n".join(
         [
@@ -156,8 +183,9 @@ def _pictures(plots: list[Path], folder: Path) -> str:
     return "\n\n".join(f"![{Path(name).stem.replace('_', ' ')}]({name})" for name in names)
 
 
-def _meanings() -> str:
-    return "\n".join(["## What the figures mean", "", *(f"- **{m.title}**: {m.meaning}" for m in TRAINING)])
+def _meanings(scalars: Scalars) -> str:
+    meanings = (f"- **{m.title}**: {m.meaning}" for m in _present(scalars, TRAINING + LABELS) or TRAINING)
+    return "\n".join(["## What the figures mean", "", *meanings])
 
 
 def _going_on(folder: Path) -> str:

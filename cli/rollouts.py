@@ -1,16 +1,18 @@
 """What an agent can do, in episodes: how long it stays up, how often it falls, how much it moves like the clips."""
 
 import dataclasses
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import torch
 from torch import Tensor
 
-from murmillo.agents.common.interface import Agent
+from murmillo.agents.common.interface import Agent, Labelled
 from murmillo.agents.common.rollout import Rollout, tensors, true_next_obs
 from murmillo.envs import HumanoidVectorEnv
+
+_HEAD = "head/"
 
 
 @dataclass(frozen=True)
@@ -24,6 +26,8 @@ class Measures:
         fall_rate: share of the episodes that ended by a fall.
         score: the judge's probability that a motion is a clip, mean over the steps.
         rewards: the judge's reward terms by name, mean over the steps.
+        heads: of a judge with labels, what its heads give by name (`Labelled.head_scores`), mean over the steps.
+        residual_share: mean L2 norm of the residual forces [N] over that of the joint torques [N m], if there are any.
     """
 
     episodes: int
@@ -32,6 +36,8 @@ class Measures:
     fall_rate: float
     score: float
     rewards: dict[str, float]
+    heads: dict[str, float] = field(default_factory=dict)
+    residual_share: float | None = None
 
     def as_dict(self) -> dict[str, Any]:
         return dataclasses.asdict(self)
@@ -56,7 +62,7 @@ def measure(env: HumanoidVectorEnv, agent: Agent, judge: Agent, seed: int) -> Me
         obs, _, terminated, truncated, infos = env.step(step.action.numpy())
         successor = {f"next_{name}": value for name, value in true_next_obs(obs, infos).items()}
         row.store(0, {**seen, **step.extras, **successor, "action": step.action})
-        for name, value in _terms(judge, row).items():
+        for name, value in {**_terms(judge, row), **_efforts(infos)}.items():
             totals[name] = totals.get(name, 0.0) + value[alive].sum().item()
         length += alive
         fell |= alive & torch.as_tensor(terminated)
@@ -66,10 +72,22 @@ def measure(env: HumanoidVectorEnv, agent: Agent, judge: Agent, seed: int) -> Me
     steps = int(length.sum())
     means = {name: total / steps for name, total in totals.items()}
     score = means.pop("score")
-    return Measures(worlds, steps, length.mean().item(), fell.float().mean().item(), score, means)
+    heads = {name[len(_HEAD) :]: means.pop(name) for name in list(means) if name.startswith(_HEAD)}
+    share = means.pop("residual_force") / means.pop("joint_torque") if "residual_force" in means else None
+    return Measures(worlds, steps, length.mean().item(), fell.float().mean().item(), score, means, heads, share)
 
 
 def _terms(judge: Agent, row: Rollout) -> dict[str, Tensor]:
-    """[N] the judge's reward terms and its probability D, from style = -log(1 - D)."""
+    """[N] the judge's reward terms and its probability D, from style = -log(1 - D); the scores of its heads, if any."""
     terms = {name: value[0] for name, value in judge.rewards(row).items()}
-    return {**terms, "score": 1.0 - torch.exp(-terms["style"])}
+    heads = judge.head_scores(row) if isinstance(judge, Labelled) else {}
+    return {
+        **terms,
+        "score": 1.0 - torch.exp(-terms["style"]),
+        **{_HEAD + name: value[0] for name, value in heads.items()},
+    }
+
+
+def _efforts(infos: dict[str, Any]) -> dict[str, Tensor]:
+    """[N] the norms of residual forces and joint torques, where there are residual forces."""
+    return {name: torch.as_tensor(infos[name]) for name in ("residual_force", "joint_torque") if name in infos}

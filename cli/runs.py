@@ -11,6 +11,9 @@ from murmillo.cli.errors import CommandError, near_names
 
 CONFIG = "config.yaml"
 VERSIONS = "versions.json"
+TERMS = "terms.json"
+SKILLS = "skills.json"
+NOTICES = "notices.json"
 SCALARS = "scalars.csv"
 CHECKPOINTS = "checkpoints"
 LAST = f"{CHECKPOINTS}/last"

@@ -14,18 +14,20 @@ from typing import Any
 import torch
 
 from murmillo.agents.common import checkpoint
+from murmillo.agents.common.interface import Labelled
 from murmillo.agents.common.logger import Logger
 from murmillo.agents.common.runner import Runner
 from murmillo.agents.common.warm_start import warm_start
 from murmillo.cli import config as configuration
 from murmillo.cli import report, runs, versions
-from murmillo.cli.agents import AGENTS, checkpoint_meta, make_agent
+from murmillo.cli.agents import checkpoint_meta, make_agent
 from murmillo.cli.checks import check_clips, check_settings
 from murmillo.cli.config import TrainConfig
 from murmillo.cli.errors import user_errors
 from murmillo.cli.evaluate import measure_ages
 from murmillo.cli.progress import Progress, make_progress
 from murmillo.envs import HumanoidVectorEnv
+from murmillo.envs.motion.licences import terms_of
 
 FILM_S = 6
 """Length of the film: without a graphics card a second of it takes five to draw."""
@@ -81,6 +83,9 @@ def _train(config: TrainConfig, env: HumanoidVectorEnv, folder: Path, resuming: 
     )
     if resuming:
         runner.load(folder / runs.LAST)
+    terms = dataclasses.asdict(terms_of(env.library.clips))
+    runner.meta |= {"terms": terms}  # after loading: they are kept with a checkpoint, and need not be those here
+    runs.write_json(folder / runs.TERMS, terms)
     progress = make_progress(config.runner.samples, runner.samples, config.runner.max_minutes)
     with progress, _stopping(runner.stop, progress) as stopped:
         progress.say(f"{folder}: {config.choices['agent']} on {len(env.library.clips)} clips, {config.num_envs} worlds")
@@ -90,7 +95,10 @@ def _train(config: TrainConfig, env: HumanoidVectorEnv, folder: Path, resuming: 
         runner.on_iteration = [
             lambda scalars: progress.show(int(scalars["samples"]), time.monotonic() - begun, scalars)
         ]
+        runner.on_warning = [lambda text: progress.say(f"warning: {text}")]
         runner.run()
+    _keep_skills(agent, env, folder)
+    runs.write_json(folder / runs.NOTICES, [dataclasses.asdict(notice) for notice in runner.watch.notices])
     logger.close()
     if stopped():
         report.write(folder)
@@ -98,6 +106,14 @@ def _train(config: TrainConfig, env: HumanoidVectorEnv, folder: Path, resuming: 
         return 0
     _finish(config, folder)
     return 0
+
+
+def _keep_skills(agent: Any, env: HumanoidVectorEnv, folder: Path) -> None:
+    """Write what an agent with labels knows of each skill."""
+    if isinstance(agent, Labelled):
+        tables = {name: figures.tolist() for name, figures in agent.skill_tables().items()}
+        skills = [dict(zip(tables, figures, strict=True)) for figures in zip(*tables.values(), strict=True)]
+        runs.write_json(folder / runs.SKILLS, dict(zip(env.skills, skills, strict=True)))
 
 
 def _warm_start(
@@ -112,16 +128,9 @@ def _warm_start(
     if config.warm_start.steps == 0:
         return
     progress.say(f"warm start: {config.warm_start.steps} steps on the clips' own next poses")
-    condition = AGENTS[config.choices["agent"]].condition
-    losses = warm_start(
-        agent.model,
-        env.imitation_pairs,
-        config.warm_start,
-        generator,
-        lambda n: condition(config.agent, n, generator),
-    )
+    losses = warm_start(agent.model, env.imitation_pairs, config.warm_start, generator, agent.random_condition)
     progress.say(f"warm start: squared error of the action from {losses[0]:.4f} to {losses[-1]:.4f}")
-    meta = checkpoint_meta(config.choices["agent"], config.agent, env)
+    meta = {**checkpoint_meta(config.choices["agent"], config.agent, env), "terms": runs.read_json(folder / runs.TERMS)}
     checkpoint.save(folder / runs.WARM_STARTED, {"meta": meta, "agent": agent.state_dict()})
 
 

@@ -20,6 +20,9 @@ def command_error(error: Exception, known: DictConfig | None) -> CommandError:
         return CommandError(f"{group}={choice}: there is no such choice; {near_names(choice, options)}")
     if isinstance(error, OverrideParseException):
         return CommandError(f"{error.override}: this is not name=value; quote a value that holds signs: name='va,l=ue'")
+    if unfit := re.match(r"In '(\w+)/(\w+)': ConfigKeyError .*full_key: (\S+)", str(error), re.DOTALL):
+        group, choice, key = unfit.groups()
+        return CommandError(f"{group}={choice}: it sets {key}, which the chosen agent has not; choose another {group}")
     cause = error.__cause__ if isinstance(error, HydraException) and error.__cause__ else error
     if isinstance(cause, (ConfigAttributeError, ConfigKeyError)):
         hint = _near_keys(str(cause.full_key), known)

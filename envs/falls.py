@@ -41,10 +41,14 @@ class FallDetector:
         self._bodies = character.body_ids(falling)
         self._low = torch.tensor([config.heights.get(body, config.height) for body in falling], dtype=torch.float64)
         self._force = config.force
+        self.touch_is_fall = False
+        """Whether a touch alone is a fall, however high the bodies are."""
 
     def __call__(self, state: State) -> Tensor:
         """[N] bool: these worlds lie on the ground. The touched body and the low one may be different bodies."""
         touched = (state.ground_force_w[:, self._bodies].abs() > self._force).any(-1).any(-1)
+        if self.touch_is_fall:
+            return touched
         low = (state.body_pos_w[:, self._bodies, 2] < self._low).any(-1)
         return touched & low
 

@@ -1,5 +1,7 @@
 """Skeletal residual forces: help from outside at the joints, in units of a scale (C.ASE section 4.2)."""
 
+from typing import Literal
+
 import torch
 from torch import Tensor
 
@@ -13,9 +15,10 @@ _UNASSISTED = ("sword", "shield")  # what is carried is no joint of the skeleton
 class ResidualForces:
     """Maps residual actions to forces at the body origins, which are the joints."""
 
-    def __init__(self, character: Character, scale: float) -> None:
-        """`scale` [N] is the force of a component of 1."""
+    def __init__(self, character: Character, scale: float, reward: Literal["sum", "mean"] = "sum") -> None:
+        """`scale` [N] is the force of a component of 1; `reward` is the form of the regularising reward."""
         self.scale = scale
+        self._total = torch.sum if reward == "sum" else torch.mean
         self._bodies = character.body_ids(tuple(body for body in character.bodies if body not in _UNASSISTED))
         self._num_bodies = len(character.bodies)
 
@@ -30,3 +33,12 @@ class ResidualForces:
         force_w = torch.zeros(len(action), self._num_bodies, 3, dtype=action.dtype)
         force_w[:, self._bodies] = quat_rotate(heading_quat(state.qpos[:, None, 3:7]), force_h)
         return force_w
+
+    def reward(self, action: Tensor) -> Tensor:
+        """r_f [N], 1 without any force: exp(-sum_j |xi_j|), or with the mean over the joints in place of the sum.
+
+        The forces are in units of the scale; the paper names no unit. The mean is the published code's form, and lets
+        fifteen times the force pass.
+        """
+        size = action.clamp(-1.0, 1.0).unflatten(-1, (len(self._bodies), 3)).norm(dim=-1)
+        return torch.exp(-self._total(size, dim=-1))

@@ -66,6 +66,8 @@ class StartSampler:
         self._character, self._library = character, library
         self._pool_size = min(config.fallen_states, max(16, num_envs))
         self._pool: Tensor | None = None
+        self.on_ground = True
+        """Whether episodes may begin on the ground: fallen, or where the last one fell."""
         self._default = character.default_qpos.clone()
         self._default[2] = config.default_height
 
@@ -74,8 +76,9 @@ class StartSampler:
         n, config = len(fell), self.config
         chance = torch.rand(3, n, generator=generator)
         kinds = torch.where(chance[0] < config.reference, REFERENCE, DEFAULT)
-        kinds = torch.where(chance[1] < config.fallen, FALLEN, kinds)
-        kinds = torch.where(fell & (chance[2] < config.recovery), RECOVERY, kinds)
+        if self.on_ground:
+            kinds = torch.where(chance[1] < config.fallen, FALLEN, kinds)
+            kinds = torch.where(fell & (chance[2] < config.recovery), RECOVERY, kinds)
         if kind is not None:
             kinds.fill_(kind)
         clip, time = self._library.sample(n, generator)

@@ -12,7 +12,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from torch import Tensor
 
-from murmillo.envs.character import load_character
+from murmillo.envs.character import Character, load_character
 from murmillo.envs.errors import SuiteError
 from murmillo.envs.falls import FallConfig, FallDetector, count_every_contact
 from murmillo.envs.motion import MotionLibrary, load_clips
@@ -41,7 +41,8 @@ class EnvConfig:
         character: an MJCF of `assets/mjcf`.
         window: frames of `state` that the observation `window` holds, the newest last; 1 leaves it out.
         episode_steps: control steps until an episode is truncated (300 steps are 10 s).
-        residual_force: scale of the skeletal residual forces [N] (C.ASE section 4.2); 0 takes them out of the action.
+        residual_force: scale of the skeletal residual forces [N] (C.ASE section 3.1); 0 takes them out of the action.
+        residual_reward: form of their regularising reward (`ResidualForces.reward`), "sum" (paper) or "mean" (code).
         autoreset: gymnasium's autoreset mode of the vector environment.
         threads: CPU threads of the physics; 0 takes every CPU.
         camera, width, height: of the frames of `render_mode="rgb_array"`.
@@ -52,6 +53,7 @@ class EnvConfig:
     window: int = 1
     episode_steps: int = 300
     residual_force: float = 0.0
+    residual_reward: Literal["sum", "mean"] = "sum"
     autoreset: Literal["same_step", "next_step", "disabled"] = "same_step"
     threads: int = 0
     camera: str = "track"
@@ -78,7 +80,9 @@ class HumanoidVectorEnv(VectorEnv):
     End: `terminated` by a fall (`FallConfig`) or by the task, `truncated` after `episode_steps`.
 
     Info: `reward_terms`, `fall` [N] bool, `healed` [N] bool (a world whose simulation diverged and was reset), and in
-    SAME_STEP mode `final_obs`, the observation before any reset for all N worlds, with its mask `_final_obs` [N].
+    SAME_STEP mode `final_obs`, the observation before any reset for all N worlds, with its mask `_final_obs` [N]. With
+    residual forces also `side_rewards`, terms that are not the task's ("residual", their regularising reward), and the
+    L2 norms [N] of `residual_force` [N] over all joints and of `joint_torque` [N m], of the PD control, over all axes.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array", "human"], "render_fps": 30}  # noqa: RUF012 gymnasium's own type
@@ -104,13 +108,14 @@ class HumanoidVectorEnv(VectorEnv):
         self.task = task or Imitation()
         self._fallen = FallDetector(self.character, config.fall)
         self._starts = StartSampler(self.character, self.library, config.starts, num_envs)
-        self._residual = ResidualForces(self.character, config.residual_force) if config.residual_force > 0 else None
+        self._residual = _residual_forces(self.character, config)
         self._set_spaces()
         self._generator = torch.Generator()
         self._generator.seed()
         self._steps = torch.zeros(num_envs, dtype=torch.int64)
         self._free_steps = torch.zeros(num_envs, dtype=torch.int64)
         self._skill = torch.zeros(num_envs, dtype=torch.int64)
+        self._skill_weights: Tensor | None = None
         self._ended = torch.zeros(num_envs, dtype=torch.bool)
         self._fell = torch.zeros(num_envs, dtype=torch.bool)
         self._history = torch.zeros(num_envs, config.window, state_dim(self.character))
@@ -156,7 +161,7 @@ class HumanoidVectorEnv(VectorEnv):
     ) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """Advance all worlds by 1/30 s. See the class for what comes back."""
         resetting = self._ended & (self._mode is AutoresetMode.NEXT_STEP)
-        self._advance(torch.as_tensor(actions))
+        residual = self._advance(torch.as_tensor(actions))
         terms = {name: term.masked_fill(resetting, 0.0) for name, term in self.task.reward(self.state).items()}
         healed = self.physics.healed()
         fall = self._fallen(self.state) & (self._steps > 1) & (self._free_steps == 0)
@@ -167,6 +172,7 @@ class HumanoidVectorEnv(VectorEnv):
             "reward_terms": {name: term.numpy() for name, term in terms.items()},
             "fall": (fall & terminated).numpy(),
             "healed": healed.numpy(),
+            **residual,
         }
         if self._mode is AutoresetMode.SAME_STEP:
             info["final_obs"], info["_final_obs"] = self._observation(), self._ended.numpy()
@@ -215,19 +221,42 @@ class HumanoidVectorEnv(VectorEnv):
             raise SuiteError(f"skill={skill}: needs an index below {len(self.skills)}, or a name")
         self._skill[slice(None) if env_ids is None else list(env_ids)] = skill
 
+    def set_skill_weights(self, weights: Tensor | None) -> None:
+        """Draw the skills of new episodes with these probabilities, [K] and not negative; None draws all alike."""
+        if weights is not None and weights.shape != (len(self.skills),):
+            raise SuiteError(f"skill weights of shape {tuple(weights.shape)}: needs one for each of {len(self.skills)}")
+        self._skill_weights = weights
+
+    def set_ground_contact(self, allowed: bool) -> None:
+        """Whether bodies other than the feet may touch the ground as `fall` and `starts` say; else any touch is a fall.
+
+        Without it no episode begins fallen or where the last one fell. It is the curriculum of C.ASE (appendix A.5).
+        """
+        if not allowed and self.config.fall.contact == "any":
+            raise SuiteError("fall.contact=any: forbidding the ground needs fall.contact=ground, its touch alone")
+        self._fallen.touch_is_fall = not allowed
+        self._starts.on_ground = allowed
+
     def observation(self) -> dict[str, np.ndarray]:
         """The current observation, which a `set_skill` since the last step has changed."""
         return self._observation()
 
-    def demonstrations(self, n: int, generator: torch.Generator, skill: Tensor | None = None) -> dict[str, Tensor]:
+    def demonstrations(
+        self, n: int, generator: torch.Generator, skill: Tensor | None = None, frames: int | None = None
+    ) -> dict[str, Tensor]:
         """Windows of the clips, made by the function that makes the observations.
+
+        They end at any time of a clip, and repeat its first frame where they begin before it. If their length is asked
+        for with `frames`, they lie within their clips as far as those are long enough.
 
         Returns:
             window: [n, W, 120]; skill: [n] their labels; of the skills [n] asked for, or by the clips' weights. Where
             clips were made without a sword or a shield, also mask: [n, 120] bool, true for features that are made up.
         """
-        clip, time = self.library.sample(n, generator, skill)
-        drawn = {"window": self.library.window(clip, time, self.config.window), "skill": self.library.clip_skill[clip]}
+        span = 0.0 if frames is None else (frames - 1) * self.character.control_dt
+        clip, time = self.library.sample(n, generator, skill, span)
+        window = self.library.window(clip, time, frames or self.config.window)
+        drawn = {"window": window, "skill": self.library.clip_skill[clip]}
         return drawn if self.library.mask is None else drawn | {"mask": self.library.mask[clip]}
 
     def imitation_pairs(self, n: int, generator: torch.Generator) -> dict[str, Tensor]:
@@ -272,8 +301,8 @@ class HumanoidVectorEnv(VectorEnv):
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
 
-    def _advance(self, action: Tensor) -> None:
-        """Physics, clocks and history of one control step."""
+    def _advance(self, action: Tensor) -> dict[str, Any]:
+        """Physics, clocks and history of one control step; what info says of the residual forces."""
         expected = (self.num_envs, self._action_dim)
         if action.shape != expected:
             raise SuiteError(f"action of shape {tuple(action.shape)}: needs {expected}")
@@ -284,6 +313,13 @@ class HumanoidVectorEnv(VectorEnv):
         self._steps += 1
         self._free_steps = (self._free_steps - 1).clamp_min(0)
         self._history = torch.cat((self._history[:, 1:], self._frame().unsqueeze(1)), dim=1)
+        if self._residual is None or force is None:
+            return {}
+        return {
+            "side_rewards": {"residual": self._residual.reward(extra).float().numpy()},
+            "residual_force": force.flatten(1).norm(dim=-1).numpy(),
+            "joint_torque": self.state.actuator_force.norm(dim=-1).numpy(),
+        }
 
     def _frame(self, env_ids: Tensor | slice = slice(None)) -> Tensor:
         """[n, 120] the current states of these worlds."""
@@ -309,10 +345,14 @@ class HumanoidVectorEnv(VectorEnv):
         free = (starts.kind == RECOVERY) | (starts.kind == FALLEN)
         self._steps[ids] = 0
         self._free_steps[ids] = torch.where(free, self.config.starts.free_steps, 0)
-        skills = torch.randint(len(self.skills), (len(ids),), generator=self._generator)
-        self._skill = self._skill.index_copy(0, ids, skills)
+        self._skill = self._skill.index_copy(0, ids, self._draw_skills(len(ids)))
         self._ended = self._ended & ~mask
         self.task.reset(ids, self.state)
+
+    def _draw_skills(self, n: int) -> Tensor:
+        if self._skill_weights is None:
+            return torch.randint(len(self.skills), (n,), generator=self._generator)
+        return torch.multinomial(self._skill_weights, n, replacement=True, generator=self._generator)
 
     def _observation(self) -> dict[str, np.ndarray]:
         observation = {"state": self._history[:, -1].numpy(), "skill": self._skill.numpy().copy()}
@@ -321,6 +361,12 @@ class HumanoidVectorEnv(VectorEnv):
         if self.task.goal_dim:
             observation["goal"] = self.task.goal(self.state).numpy()
         return observation
+
+
+def _residual_forces(character: Character, config: EnvConfig) -> ResidualForces | None:
+    if config.residual_force == 0:
+        return None
+    return ResidualForces(character, config.residual_force, config.residual_reward)
 
 
 def _check(config: EnvConfig, render_mode: str | None, modes: list[str]) -> None:

@@ -3,20 +3,20 @@
 from typing import Any
 
 import torch
-from gymnasium import spaces
 from gymnasium.vector import VectorEnv
 from torch import Tensor
 
 from murmillo.agents.ase.config import ASEConfig
 from murmillo.agents.ase.encoder import Encoder
-from murmillo.agents.ase.losses import diversity_loss, encoder_loss, skill_reward
+from murmillo.agents.common.dimensions import dimensions
 from murmillo.agents.common.discriminator import Discriminator, Windows, discriminator_loss, style_reward
-from murmillo.agents.common.errors import AgentError
 from murmillo.agents.common.interface import Demonstrations, Obs, Step
 from murmillo.agents.common.latents import LatentSequence, sample_sphere
+from murmillo.agents.common.masks import FeatureMasks
 from murmillo.agents.common.ppo import PPO, ActorCritic, Minibatch
 from murmillo.agents.common.replay import Replay
 from murmillo.agents.common.rollout import Rollout
+from murmillo.agents.common.skill_discovery import diversity_loss, encoder_loss, skill_reward
 from murmillo.agents.common.training import Means, adam, adam_state, load_adam_state, load_module, named
 
 
@@ -38,7 +38,7 @@ class ASE:
         Raises:
             AgentError: environment or demonstrations give no windows of `config.window` frames.
         """
-        state_dim, action_dim = _dimensions(env, demonstrations, config)
+        state_dim, action_dim = dimensions(env, demonstrations, config.window)
         self.config = config
         self.demonstrations = demonstrations
         self.generator = generator
@@ -48,7 +48,8 @@ class ASE:
         hidden = config.discriminator.hidden
         self.discriminator = Discriminator(config.window, state_dim, config.discriminator, generator)
         # known before the first update, lest that judges windows in raw units and every later one in other units
-        self.discriminator.normalizer.update(demonstrations(config.discriminator.minibatch, generator)["window"])
+        self._observe_demonstrations()
+        self.masks = FeatureMasks(demonstrations)
         self.encoder = Encoder(config.window * state_dim, hidden, config.latent_dim, config.shared_trunk, generator)
         self.optimizer = adam(
             ([*self.discriminator.parameters(), *self.encoder.parameters()], config.discriminator.learning_rate)
@@ -73,7 +74,7 @@ class ASE:
         config = self.config
         style, skill = [], []
         for window, latent in zip(rollout["next_window"], rollout["latent"], strict=True):
-            x = self.discriminator.prepare(window)
+            x = self.discriminator.prepare(window, self.masks.draw(len(window), self.generator))
             features = self.discriminator.features(x)
             style.append(style_reward(self.discriminator.judge(features)))
             skill.append(skill_reward(self.encoder(x, features), latent, config.kappa, config.skill_reward))
@@ -91,8 +92,13 @@ class ASE:
             rows = torch.randint(len(windows), (k,), generator=generator)
             agent = windows[rows]
             replay = self.replay.sample(k, generator)["window"] if len(self.replay) else agent
-            demonstration = self.demonstrations(k, generator)["window"]
-            loss = discriminator_loss(self.discriminator, Windows(agent), Windows(replay), Windows(demonstration))
+            drawn = self.demonstrations(k, generator)
+            loss = discriminator_loss(
+                self.discriminator,
+                agent=Windows(agent, mask=self.masks.draw(k, generator)),
+                replay=Windows(replay, mask=self.masks.draw(k, generator)),
+                demonstration=Windows(drawn["window"], mask=drawn.get("mask")),
+            )
             losses = dict(loss.parts)
             if config.skill_discovery:
                 mu_q = self.encoder(loss.agent_inputs, loss.agent_features)
@@ -112,8 +118,16 @@ class ASE:
         )
         self.replay.add({"window": windows}, generator)
         self.discriminator.normalizer.update(rollout["next_state"])
-        self.discriminator.normalizer.update(self.demonstrations(k, generator)["window"])
+        self._observe_demonstrations()
         return named("discriminator", means.result()) | named("ppo", ppo)
+
+    def random_condition(self, n: int) -> Tensor:
+        """Random latents `[n, Z]`, for a policy that is fitted to clips."""
+        return sample_sphere(n, self.config.latent_dim, self.generator)
+
+    def _observe_demonstrations(self) -> None:
+        drawn = self.demonstrations(self.config.discriminator.minibatch, self.generator)
+        self.discriminator.observe(drawn["window"], drawn.get("mask"))
 
     def _diversity(self, batch: Minibatch, mean: Tensor) -> dict[str, Tensor]:
         """The last term of eq. 15, with one z' drawn for each sample's z."""
@@ -143,19 +157,3 @@ class ASE:
         load_adam_state(self.optimizer, state["optimizer"])
         self.replay.load_state_dict(state["replay"])
         self.latents.load_state_dict(state["latents"])
-
-
-def _dimensions(env: VectorEnv, demonstrations: Demonstrations, config: ASEConfig) -> tuple[int, int]:
-    """D and A, after a look at whether the windows have the shape that the config speaks of."""
-    observations, actions = env.single_observation_space, env.single_action_space
-    if not isinstance(observations, spaces.Dict) or not {"state", "window"} <= observations.keys():
-        raise AgentError("ASE needs dict observations with 'state' and 'window'; make the environment with window >= 2")
-    if not isinstance(actions, spaces.Box) or len(actions.shape) != 1:
-        raise AgentError(f"ASE needs a Box action space [A]; the environment's is {actions}")
-    state_dim = spaces.flatdim(observations["state"])
-    drawn = demonstrations(1, torch.Generator().manual_seed(0))["window"][0]
-    expected = [config.window, state_dim]
-    for origin, shape in (("the environment", observations["window"].shape), ("a demonstration", drawn.shape)):
-        if list(shape or ()) != expected:
-            raise AgentError(f"agent.window={config.window} wants windows {expected}; {origin} has {list(shape or ())}")
-    return state_dim, actions.shape[0]

@@ -11,7 +11,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from murmillo.agents.common.networks import linear, mlp
+from murmillo.agents.common.networks import Dropout, linear, mlp
 from murmillo.agents.common.normalizer import RunningNormalizer
 
 
@@ -29,6 +29,8 @@ class DiscriminatorConfig:
         weight_decay: on the squared weights of trunk and last layer (released code).
         replay_size: windows kept from earlier iterations (released code).
         replay_keep: probability that a window enters the full replay (released code).
+        dropout: probability that an element is hidden before each layer, the input's included, while the discriminator
+            is trained (C·ASE's element-wise feature masking); when it gives rewards it sees everything.
     """
 
     hidden: tuple[int, ...] = (1024, 1024, 512)
@@ -40,13 +42,20 @@ class DiscriminatorConfig:
     weight_decay: float = 1e-4
     replay_size: int = 200_000
     replay_keep: float = 0.01
+    dropout: float = 0.0
 
 
 class Windows(NamedTuple):
-    """Windows `[B, W, D]`, oldest frame first, and what the discriminator is told about each, `[B, ...]` or nothing."""
+    """Windows `[B, W, D]`, oldest frame first.
+
+    Attributes:
+        condition: what the discriminator is told about each, `[B, ...]` or nothing.
+        mask: bool `[B, D]`, true where a feature is left out of all frames of a window; None leaves nothing out.
+    """
 
     window: Tensor
     condition: Tensor | None = None
+    mask: Tensor | None = None
 
 
 class Condition(nn.Module):
@@ -91,12 +100,19 @@ class Discriminator(nn.Module):
         # one normaliser for all frames: a feature has the same scale wherever it stands in the window, and a stationary
         # feature cannot be told from its place in it
         self.normalizer = RunningNormalizer((state_dim,))
-        self.trunk = mlp([frames * state_dim + self.condition.inputs, *config.hidden], generator)
+        sizes = [frames * state_dim + self.condition.inputs, *config.hidden]
+        self.trunk = mlp(sizes, generator, config.dropout)
+        self.dropout = Dropout(config.dropout, generator)
         self.head = linear(config.hidden[-1], self.condition.outputs, generator, bound=1.0)
+        self.eval()
 
-    def prepare(self, window: Tensor) -> Tensor:
-        """Normalised flat windows `[B, W D]` from raw ones `[B, W, D]`."""
-        return self.normalizer(window).flatten(1)
+    def observe(self, window: Tensor, mask: Tensor | None = None) -> None:
+        """Let the normaliser learn from raw windows `[B, W, D]`, but for what their mask `[B, D]` leaves out."""
+        self.normalizer.update(window, None if mask is None else mask[:, None])
+
+    def prepare(self, window: Tensor, mask: Tensor | None = None) -> Tensor:
+        """Normalised flat windows `[B, W D]` from raw ones `[B, W, D]`, zero where the mask `[B, D]` leaves out."""
+        return leave_out(self.normalizer(window), mask).flatten(1)
 
     def features(self, x: Tensor, condition: Tensor | None = None) -> Tensor:
         """The trunk's last layer `[B, H]` on prepared windows `[B, W D]`; an encoder may sit on it."""
@@ -104,11 +120,16 @@ class Discriminator(nn.Module):
 
     def judge(self, features: Tensor, condition: Tensor | None = None) -> Tensor:
         """Logits `[B]` from features `[B, H]`."""
-        return self.condition.pick(self.head(features), condition)
+        return self.condition.pick(self.head(self.dropout(features)), condition)
 
-    def logits(self, window: Tensor, condition: Tensor | None = None) -> Tensor:
-        """Logits `[B]` of raw windows `[B, W, D]`."""
-        return self.judge(self.features(self.prepare(window), condition), condition)
+    def logits(self, window: Tensor, condition: Tensor | None = None, mask: Tensor | None = None) -> Tensor:
+        """Logits `[B]` of raw windows `[B, W, D]`; the arguments are those of `Windows`."""
+        return self.judge(self.features(self.prepare(window, mask), condition), condition)
+
+
+def leave_out(frames: Tensor, mask: Tensor | None) -> Tensor:
+    """Normalised frames `[B, W, D]` with zeros, the mean, where the mask `[B, D]` is true."""
+    return frames if mask is None else frames.masked_fill(mask[:, None], 0.0)
 
 
 @dataclass(frozen=True)
@@ -127,30 +148,41 @@ class DiscriminatorLoss:
 
 
 def discriminator_loss(
-    discriminator: Discriminator, agent: Windows, replay: Windows, demonstration: Windows
+    discriminator: Discriminator,
+    agent: Windows,
+    replay: Windows,
+    demonstration: Windows,
+    negative: Windows | None = None,
 ) -> DiscriminatorLoss:
     """ASE's eq. 14 with the regularisers of the released code, as named parts whose sum is minimised.
 
-        1/2 [ BCE(agent and replay, 0) + BCE(demonstration, 1) ] + w_gp E ||d logit / dx||^2
+        1/2 [ BCE(agent, replay and negative, 0) + BCE(demonstration, 1) ] + w_gp E ||d logit / dx||^2
             + logit_decay ||w_logit||^2 + weight_decay ||w||^2
 
     Eq. 14 sums its two expectations without the 1/2; with it, w_gp = 5 means what it means in the released code. The
-    gradient penalty is on the logit at the *normalised* demonstrations, since only so is the weight free of units.
+    gradient penalty is on the logit at the *normalised* demonstrations, since only so is the weight free of units, and
+    before their masks, since what a clip leaves out is no input of its logit. `negative` are true windows under a
+    condition that is not theirs (CALM, eq. 7).
     """
     config = discriminator.config
-    x = discriminator.prepare(demonstration.window).requires_grad_()
-    demo_logits = discriminator.judge(discriminator.features(x, demonstration.condition), demonstration.condition)
-    agent_inputs = discriminator.prepare(agent.window)
+    discriminator.train()  # dropout is for these losses only
+    x = discriminator.normalizer(demonstration.window).requires_grad_()
+    demo_features = discriminator.features(leave_out(x, demonstration.mask).flatten(1), demonstration.condition)
+    demo_logits = discriminator.judge(demo_features, demonstration.condition)
+    agent_inputs = discriminator.prepare(agent.window, agent.mask)
     agent_features = discriminator.features(agent_inputs, agent.condition)
     agent_logits = discriminator.judge(agent_features, agent.condition)
-    replay_logits = discriminator.logits(replay.window, replay.condition)
+    replay_logits = discriminator.logits(*replay)
 
-    share = 0.5 / (len(agent_logits) + len(replay_logits))
+    fakes = {"agent": agent_logits, "replay": replay_logits}
+    if negative is not None:
+        fakes["negative"] = discriminator.logits(*negative)
+    discriminator.eval()
+    share = 0.5 / sum(len(logits) for logits in fakes.values())
     weights = [layer.weight for layer in discriminator.trunk if isinstance(layer, nn.Linear)]
     logit_square = discriminator.head.weight.square().sum()
     parts = {
-        "agent": share * F.softplus(agent_logits).sum(),
-        "replay": share * F.softplus(replay_logits).sum(),
+        **{name: share * F.softplus(logits).sum() for name, logits in fakes.items()},
         "demonstration": 0.5 * F.softplus(-demo_logits).mean(),
         "gradient_penalty": config.gradient_penalty * gradient_penalty(demo_logits, x),
         "logit_decay": config.logit_decay * logit_square,

@@ -1,7 +1,7 @@
 """What the runner asks of an agent, and what an agent asks of its demonstrations."""
 
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import torch
 from torch import Tensor
@@ -60,13 +60,42 @@ class Agent(Protocol):
     def load_state_dict(self, state: dict[str, Any]) -> None: ...
 
 
+@runtime_checkable
+class Directing(Protocol):
+    """An agent that also says what the next episodes should be like."""
+
+    def directions(self) -> dict[str, Any]:
+        """Settings of the environment by name, each for its method `set_<name>`, told before every iteration."""
+        ...
+
+
+@runtime_checkable
+class Labelled(Protocol):
+    """An agent that is told a skill, and knows more of each than fits into a log."""
+
+    def skill_tables(self) -> dict[str, Tensor]:
+        """Figures of each skill `[K]` by name, for the report."""
+        ...
+
+    def head_scores(self, rollout: Rollout) -> dict[str, Tensor]:
+        """What the discriminator gives to each motion `[T, N]` under its label, "right", and under others, "other".
+
+        Probabilities; there is no "other" where there is only one label.
+        """
+        ...
+
+
 class Demonstrations(Protocol):
     """Draws windows of the reference motions: `{"window": [n, W, D], "skill": [n]}`, oldest frame first.
 
+    `frames` asks for windows of another length than the environment's; they lie within their clips where those are long
+    enough, and begin with a clip's first frame, repeated, where not.
     A third entry, `mask` [n, D] bool, may say which features of a window are not to be judged by.
     """
 
-    def __call__(self, n: int, generator: torch.Generator, skill: Tensor | None = None) -> dict[str, Tensor]: ...
+    def __call__(
+        self, n: int, generator: torch.Generator, skill: Tensor | None = None, frames: int | None = None
+    ) -> dict[str, Tensor]: ...
 
 
 class ImitationPairs(Protocol):

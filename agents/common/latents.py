@@ -1,5 +1,6 @@
 """Latent skills on the unit sphere: the one sampler, and the clocks that decide when a world gets a new one."""
 
+from collections.abc import Callable
 from typing import Any
 
 import torch
@@ -14,18 +15,40 @@ def sample_sphere(n: int, dim: int, generator: torch.Generator) -> Tensor:
     return F.normalize(torch.randn(n, dim, generator=generator), dim=-1)
 
 
+def interpolate(start: Tensor, end: Tensor, t: float | Tensor) -> Tensor:
+    """Latents `[..., Z]` of unit length on the great circle from `start` to `end`, at t in [0, 1]."""
+    angle = torch.acos((start * end).sum(-1, keepdim=True).clamp(-1 + 1e-6, 1 - 1e-6))
+    return F.normalize(torch.sin((1 - t) * angle) * start + torch.sin(t * angle) * end, dim=-1)
+
+
 class LatentSequence:
     """Every world's sequence of latents, each kept for a uniform 1 to 150 steps (ASE, section 6.4 and appendix A)."""
 
     def __init__(
-        self, num_envs: int, dim: int, generator: torch.Generator, min_steps: int = 1, max_steps: int = 150
+        self,
+        num_envs: int,
+        dim: int,
+        generator: torch.Generator,
+        min_steps: int = 1,
+        max_steps: int = 150,
+        *,
+        draw: Callable[[Tensor], Tensor] | None = None,
     ) -> None:
+        """
+        Args:
+            num_envs: N.
+            dim: Z.
+            generator: draws latents and durations.
+            min_steps, max_steps: range of the durations [control steps].
+            draw: gives new latents `[n, Z]` for worlds `[n]`; uniform on the sphere without it.
+        """
         if not 1 <= min_steps <= max_steps:
             raise AgentError(f"latent_steps=[{min_steps}, {max_steps}] is no range of steps; the paper has [1, 150]")
         self.dim = dim
         self.min_steps = min_steps
         self.max_steps = max_steps
         self.generator = generator
+        self._draw = draw or (lambda env_ids: sample_sphere(len(env_ids), dim, generator))
         self.latent = torch.zeros(num_envs, dim)
         self.steps_left = torch.zeros(num_envs, dtype=torch.int64)
         self.reset(torch.arange(num_envs))
@@ -41,8 +64,13 @@ class LatentSequence:
     def reset(self, env_ids: Tensor) -> None:
         """New latents and durations for these worlds, `[n]` int64."""
         n = len(env_ids)
-        self.latent[env_ids] = sample_sphere(n, self.dim, self.generator)
+        self.latent[env_ids] = self._draw(env_ids)
         self.steps_left[env_ids] = torch.randint(self.min_steps, self.max_steps + 1, (n,), generator=self.generator)
+
+    def hold(self, latent: Tensor) -> None:
+        """These latents `[N, Z]`, or `[Z]` for all worlds, until the next `reset`."""
+        self.latent.copy_(latent.expand_as(self.latent))
+        self.steps_left.fill_(torch.iinfo(torch.int64).max)
 
     def state_dict(self) -> dict[str, Any]:
         return {"latent": self.latent, "steps_left": self.steps_left}

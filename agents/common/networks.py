@@ -19,10 +19,31 @@ def linear(inputs: int, outputs: int, generator: torch.Generator, bound: float |
     return layer
 
 
-def mlp(sizes: Sequence[int], generator: torch.Generator) -> nn.Sequential:
-    """Layers of the given sizes, the input's first, with a ReLU after every one."""
+class Dropout(nn.Module):
+    """In training mode hides each element with probability `rate` and scales up the others (Srivastava et al. 2014).
+
+    PyTorch's own draws from the global generator, whose state no checkpoint of ours keeps.
+    """
+
+    def __init__(self, rate: float, generator: torch.Generator) -> None:
+        super().__init__()
+        if not 0 <= rate < 1:
+            raise AgentError(f"dropout={rate} is no probability below 1; C·ASE has 0.2, and 0 leaves it out")
+        self.rate = rate
+        self.generator = generator
+
+    def forward(self, x: Tensor) -> Tensor:
+        if not self.training or self.rate == 0:
+            return x
+        kept = torch.empty_like(x).bernoulli_(1 - self.rate, generator=self.generator)
+        return x * kept / (1 - self.rate)
+
+
+def mlp(sizes: Sequence[int], generator: torch.Generator, dropout: float = 0.0) -> nn.Sequential:
+    """Layers of the given sizes, the input's first, with a ReLU after every one and dropout, if any, before it."""
     layers: list[nn.Module] = []
     for inputs, outputs in pairwise(sizes):
+        layers += [Dropout(dropout, generator)] if dropout else []
         layers += [linear(inputs, outputs, generator), nn.ReLU()]
     return nn.Sequential(*layers)
 

@@ -37,18 +37,34 @@ class RunningNormalizer(nn.Module):
         return torch.sqrt(self.var + self.eps).to(like.dtype)
 
     @torch.no_grad()
-    def update(self, batch: Tensor) -> None:
-        """Take in a batch `[..., *shape]` (Chan et al.'s parallel form of Welford's algorithm)."""
+    def update(self, batch: Tensor, left_out: Tensor | None = None) -> None:
+        """Take in a batch `[..., *shape]` (Chan et al.'s parallel form of Welford's algorithm).
+
+        Args:
+            batch: `[..., *shape]`.
+            left_out: bool, broadcast to the batch's shape; true where an element says nothing. It then counts as if it
+                were like those of its feature that do, or like all before it where none does.
+        """
         if self.frozen:
             return
         rows = batch.reshape(-1, *self.mean.shape).double()
         total = self.count + len(rows)
-        var, mean = torch.var_mean(rows, dim=0, correction=0)
+        if left_out is None:
+            var, mean = torch.var_mean(rows, dim=0, correction=0)
+        else:
+            var, mean = self._moments(rows, ~left_out.expand(batch.shape).reshape(rows.shape))
         delta = mean - self.mean
         moment = self.var * self.count + var * len(rows) + delta.square() * self.count * len(rows) / total
         self.mean += delta * len(rows) / total
         self.var.copy_(moment / total)
         self.count.copy_(total)
+
+    def _moments(self, rows: Tensor, kept: Tensor) -> tuple[Tensor, Tensor]:
+        """Variance and mean of each feature over the elements that are kept, bool like `rows`."""
+        count = kept.sum(0)
+        mean = torch.where(kept, rows, 0.0).sum(0) / count
+        var = torch.where(kept, rows - mean, 0.0).square().sum(0) / count
+        return torch.where(count > 0, var, self.var), torch.where(count > 0, mean, self.mean)
 
     def freeze(self) -> None:
         """Stop learning, for good: a checkpoint remembers it."""

@@ -1,6 +1,6 @@
 """Proximal policy optimisation (Schulman et al. 2017) of a policy and a critic that may be told a condition."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from itertools import chain
 from typing import Any
@@ -116,11 +116,19 @@ class PPO:
     and the reference's case is when all rates are 2e-5.
     """
 
-    def __init__(self, model: ActorCritic, config: PPOConfig) -> None:
+    def __init__(
+        self, model: ActorCritic, config: PPOConfig, condition_parameters: Iterable[nn.Parameter] = ()
+    ) -> None:
+        """
+        Args:
+            model: policy and critic.
+            config: hyperparameters.
+            condition_parameters: of what makes the condition, if the losses are to train it, at the policy's rate.
+        """
         self.model = model
         self.config = config
         self.optimizer = adam(
-            (model.policy.parameters(), config.policy_learning_rate),
+            ([*model.policy.parameters(), *condition_parameters], config.policy_learning_rate),
             (model.critic.parameters(), config.value_learning_rate),
         )
 

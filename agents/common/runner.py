@@ -15,9 +15,10 @@ from murmillo.agents.common import checkpoint
 from murmillo.agents.common.advantages import gae
 from murmillo.agents.common.episodes import EpisodeStatistics
 from murmillo.agents.common.errors import AgentError
-from murmillo.agents.common.interface import Agent
+from murmillo.agents.common.interface import Agent, Directing
 from murmillo.agents.common.logger import Logger
 from murmillo.agents.common.rollout import Rollout, tensors, true_next_obs
+from murmillo.agents.common.watch import Watch, WatchConfig
 
 
 @dataclass
@@ -29,10 +30,11 @@ class RunnerConfig:
         horizon: T, steps of every world an iteration; 32 with 4,096 worlds makes the paper's 131,072 samples.
         gamma: discount.
         lam: lambda of GAE and of TD(lambda).
-        reward_weights: a weight for every reward term that the agent names, and for "task", the environment's own
-            reward, where it should count. 1 and beta = 0.5 are ASE's.
+        reward_weights: a weight for every reward term that the agent names, and for those of the environment that
+            should count: "task", its own reward, and what `infos["side_rewards"]` holds. 1 and beta = 0.5 are ASE's.
         checkpoint_minutes: save this often, and at the end.
         max_minutes: end after this much time, counted from `run`; None for no limit.
+        watch: when to warn that the training fails.
     """
 
     samples: int = 10_000_000_000
@@ -42,6 +44,7 @@ class RunnerConfig:
     reward_weights: dict[str, float] = field(default_factory=lambda: {"style": 1.0, "skill": 0.5})
     checkpoint_minutes: float = 10.0
     max_minutes: float | None = None
+    watch: WatchConfig = field(default_factory=WatchConfig)
 
 
 class Runner:
@@ -62,6 +65,7 @@ class Runner:
         meta: Mapping[str, Any] | None = None,
         logger: Logger | None = None,
         on_iteration: Sequence[Callable[[dict[str, float]], None]] = (),
+        on_warning: Sequence[Callable[[str], None]] = (),
     ) -> None:
         """
         Args:
@@ -73,6 +77,7 @@ class Runner:
             meta: JSON values that a checkpoint must share to be loaded: character, dimensions, skills.
             logger: takes every iteration's statistics.
             on_iteration: called with every iteration's statistics.
+            on_warning: called with one line on a known failure, when it has lasted; `watch.notices` keeps them.
 
         Raises:
             AgentError: the environment's autoreset mode is another.
@@ -88,12 +93,15 @@ class Runner:
         self.meta = dict(meta or {})
         self.logger = logger
         self.on_iteration = on_iteration
+        self.on_warning = on_warning
+        self.watch = Watch(config.watch)
         self.samples = 0
         self.iteration = 0
         self._rollout = Rollout(config.horizon, env.num_envs)
         self._episodes = EpisodeStatistics(env.num_envs)
         self._obs: dict[str, Tensor] | None = None
         self._extras: tuple[str, ...] = ()
+        self._env_terms: tuple[str, ...] = ("task",)
         self._stopping = False
 
     def run(self) -> None:
@@ -101,6 +109,7 @@ class Runner:
         begun = saved = time.monotonic()
         while not self._finished(begun):
             started = time.monotonic()
+            self._direct()
             rollout = self._collect()
             rewards = self._reward(rollout)
             self._advantage(rollout)
@@ -121,6 +130,14 @@ class Runner:
         limit = math.inf if self.config.max_minutes is None else self.config.max_minutes
         return self._stopping or self.samples >= self.config.samples or minutes >= limit
 
+    def _direct(self) -> None:
+        """Tell the environment what the agent wants of the next episodes."""
+        directions = self.agent.directions() if isinstance(self.agent, Directing) else {}
+        for name, value in directions.items():
+            if not hasattr(self.env, f"set_{name}"):
+                raise AgentError(f"the agent directs the environment's {name}, but that has no method set_{name}")
+            getattr(self.env, f"set_{name}")(value)
+
     def _collect(self) -> Rollout:
         """T steps of every world."""
         rollout = self._rollout
@@ -134,13 +151,14 @@ class Runner:
             successor = {f"next_{name}": value for name, value in true_next_obs(next_obs, infos).items()}
             successor = {name: value for name, value in successor.items() if name in self.agent.needs}
             ends = {"terminated": torch.as_tensor(terminated), "truncated": torch.as_tensor(truncated)}
-            rollout.store(t, {**successor, **ends, "task": torch.as_tensor(reward)})
+            side = {name: torch.as_tensor(term) for name, term in infos.get("side_rewards", {}).items()}
+            rollout.store(t, {**successor, **ends, "task": torch.as_tensor(reward), **side})
             done = ends["terminated"] | ends["truncated"]
             self._episodes.step(ends["terminated"], done)
             if done.any():
                 self.agent.reset(done.nonzero().flatten())
             obs = tensors(next_obs)
-            self._extras = tuple(step.extras)
+            self._extras, self._env_terms = tuple(step.extras), ("task", *side)
         self._obs = obs
         return rollout
 
@@ -152,8 +170,8 @@ class Runner:
 
     def _reward(self, rollout: Rollout) -> dict[str, float]:
         """Sum the weighted terms into "reward"; the mean of every term and of the sum, by name."""
-        weights = {"task": 0.0, **self.config.reward_weights}
-        terms = {"task": rollout["task"], **self.agent.rewards(rollout)}
+        weights = {**dict.fromkeys(self._env_terms, 0.0), **self.config.reward_weights}
+        terms = {**{name: rollout[name] for name in self._env_terms}, **self.agent.rewards(rollout)}
         if terms.keys() != weights.keys():
             raise AgentError(
                 f"reward_weights names {', '.join(sorted(self.config.reward_weights))}, "
@@ -179,8 +197,9 @@ class Runner:
         for name, value in scalars.items():
             if not math.isfinite(value):
                 raise AgentError(
-                    f"iteration {self.iteration + 1}: {name} is {value}; resume from the last checkpoint "
-                    f"({self.checkpoint_folder}) with a lower learning rate"
+                    f"iteration {self.iteration + 1}: {name} is {value}: the training has diverged; begin anew with a "
+                    "lower agent.ppo.policy_learning_rate, agent.ppo.value_learning_rate or "
+                    f"agent.discriminator.learning_rate; {self.checkpoint_folder} is from before"
                 )
 
     def _log(self, scalars: dict[str, float], seconds: float) -> None:
@@ -197,6 +216,9 @@ class Runner:
             self.logger.log(self.samples, stats)
         for callback in self.on_iteration:
             callback(stats)
+        for warning in self.watch.see(stats):
+            for callback in self.on_warning:
+                callback(warning)
 
     def save(self) -> None:
         """Write all that the next iteration depends on to the checkpoint folder."""
@@ -206,6 +228,7 @@ class Runner:
             "generator": self.generator.get_state(),
             "samples": self.samples,
             "iteration": self.iteration,
+            "watch": self.watch.state_dict(),
         }
         if self._obs is not None and hasattr(self.env, "state_dict"):
             state |= {"env": self.env.state_dict(), "obs": self._obs, "episodes": self._episodes.state_dict()}  # type: ignore
@@ -222,6 +245,7 @@ class Runner:
         self.agent.load_state_dict(state["agent"])
         self.samples, self.iteration = state["samples"], state["iteration"]
         self.generator.set_state(state["generator"])
+        self.watch.load_state_dict(state["watch"])
         if "env" in state:
             self.env.load_state_dict(state["env"])  # type: ignore
             self._episodes.load_state_dict(state["episodes"])

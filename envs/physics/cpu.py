@@ -36,6 +36,7 @@ class CpuPhysics:
             body_com_w=_view(self._batch.bind("xipos"))[:, 1:],
             site_pos_w=_view(self._batch.bind("site_xpos")),
             ground_force_w=_view(ground).unflatten(1, (len(character.bodies), 3)),
+            actuator_force=_view(self._batch.bind("actuator_force")),
             key_sites=torch.as_tensor(character.key_sites),
         )
         self._expected_time = np.zeros(num_envs)

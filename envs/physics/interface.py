@@ -20,6 +20,7 @@ class State:
         body_com_w: [N, B, 3] centres of mass [m].
         site_pos_w: [N, S, 3] sites [m].
         ground_force_w: [N, B, 3] force of the ground on each body in the last substep [N].
+        actuator_force: [N, A] torque of the PD control at each axis of the joints in the last substep [N m].
         key_sites: [K] which of the sites are the key points.
     """
 
@@ -30,6 +31,7 @@ class State:
     body_com_w: Tensor
     site_pos_w: Tensor
     ground_force_w: Tensor
+    actuator_force: Tensor
     key_sites: Tensor
 
     @property

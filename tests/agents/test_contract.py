@@ -1,22 +1,39 @@
 """What the runner may ask of every agent. A new agent joins with one line in `AGENTS`."""
 
+import copy
+import dataclasses
 from collections.abc import Callable
+from pathlib import Path
+from typing import Any
 
 import pytest
 import torch
 
+from murmillo.agents.calm.agent import CALM
 from murmillo.agents.common import checkpoint
 from murmillo.agents.common.interface import Agent
 from murmillo.agents.common.rollout import Rollout, tensors, true_next_obs
-from tests.agents.toy import PointMass, make_ase
+from murmillo.agents.common.runner import Runner
+from tests.agents.test_calm import small_calm
+from tests.agents.toy import PointMass, equal, make_ase, make_case, make_runner
 
-Maker = Callable[[PointMass, torch.Generator], Agent]
-AGENTS: dict[str, Maker] = {"ase": make_ase}
+
+def make_calm(env: PointMass, generator: torch.Generator, **changes: Any) -> CALM:
+    return CALM(env, env.demonstrations, small_calm(**changes), generator)
+
+
+Maker = Callable[..., Agent]
+AGENTS: dict[str, Maker] = {"ase": make_ase, "calm": make_calm, "case": make_case}
 HORIZON = 9
 
 
 @pytest.fixture(params=list(AGENTS.values()), ids=list(AGENTS))
 def make(request: pytest.FixtureRequest) -> Maker:
+    return request.param
+
+
+@pytest.fixture(params=[1, 3], ids=["one_label", "three_labels"])
+def skills(request: pytest.FixtureRequest) -> int:
     return request.param
 
 
@@ -37,9 +54,15 @@ def collected(agent: Agent, env: PointMass) -> Rollout:
     return rollout
 
 
+def values(agent: Agent, env: PointMass, rollout: Rollout) -> torch.Tensor:
+    """[T, N] of the rollout's states, under what acted in them."""
+    extras = agent.act(tensors(env.reset(seed=0)[0])).extras
+    return agent.value({"state": rollout["state"]}, {name: rollout[name] for name in extras})
+
+
 @pytest.mark.parametrize("num_envs", [1, 17])
-def test_shapes_and_kinds(make: Maker, num_envs: int, generator: torch.Generator) -> None:
-    env = PointMass(num_envs)
+def test_shapes_and_kinds(make: Maker, skills: int, num_envs: int, generator: torch.Generator) -> None:
+    env = PointMass(num_envs, skills=skills)
     agent = make(env, generator)
     obs = tensors(env.reset(seed=0)[0])
     step = agent.act(obs)
@@ -61,20 +84,32 @@ def test_deterministic_actions_are_the_mean_and_draw_no_noise(make: Maker, gener
     env = PointMass(200)
     agent = make(env, generator)
     obs = tensors(env.reset(seed=0)[0])
-    state = generator.get_state()
-    clock = agent.state_dict()["latents"]
-    clock = {name: value.clone() for name, value in clock.items()}
+    before, drawn = copy.deepcopy(agent.state_dict()), generator.get_state()
     first = agent.act(obs, deterministic=True)
-    generator.set_state(state)
-    agent.load_state_dict({**agent.state_dict(), "latents": clock})
+    agent.load_state_dict(before)
+    generator.set_state(drawn)
     noisy = agent.act(obs)
-    assert torch.equal(first.extras["latent"], noisy.extras["latent"])
+    assert all(torch.equal(first.extras[name], noisy.extras[name]) for name in first.extras)
     assert (noisy.action - first.action).mean(0).abs().max() < 0.03  # std 0.1 over 200 worlds
     assert (first.log_prob >= noisy.log_prob).all()
+    agent.load_state_dict(before)
+    generator.set_state(drawn)
+    assert torch.equal(first.action, agent.act(obs, deterministic=True).action)
 
 
-def test_rewards_have_the_rollouts_shape(make: Maker, generator: torch.Generator) -> None:
-    env = PointMass(13)
+def test_a_reset_begins_anew_in_its_worlds_only(make: Maker, generator: torch.Generator) -> None:
+    env = PointMass(30)
+    agent = make(env, generator, latent_steps=(50, 50))
+    obs = tensors(env.reset(seed=0)[0])
+    before = agent.act(obs).extras["latent"]
+    agent.reset(torch.arange(10))
+    changed = (agent.act(obs).extras["latent"] != before).any(-1)
+    assert changed[:10].all()
+    assert not changed[10:].any()
+
+
+def test_rewards_have_the_rollouts_shape(make: Maker, skills: int, generator: torch.Generator) -> None:
+    env = PointMass(13, skills=skills)
     agent = make(env, generator)
     terms = agent.rewards(collected(agent, env))
     assert terms
@@ -84,26 +119,46 @@ def test_rewards_have_the_rollouts_shape(make: Maker, generator: torch.Generator
         assert not term.requires_grad
 
 
-def test_an_update_moves_the_policy_and_reports_finite_numbers(make: Maker, generator: torch.Generator) -> None:
-    env = PointMass(15)  # 135 samples: a minibatch of 128 and one of 7
-    agent = make(env, generator)
+@pytest.mark.parametrize("num_envs", [1, 15])
+def test_an_update_moves_the_policy_and_reports_finite_numbers(
+    make: Maker, skills: int, num_envs: int, generator: torch.Generator
+) -> None:
+    env = PointMass(num_envs, skills=skills)
+    ppo = dataclasses.replace(small_calm().ppo, minibatch=min(128, 4 * num_envs))  # the last of an epoch is smaller
+    agent = make(env, generator, ppo=ppo)
     rollout = collected(agent, env)
-    before = agent.value({"state": rollout["state"]}, {"latent": rollout["latent"]})
+    before = values(agent, env, rollout)
     stats = agent.update(rollout)
-    after = agent.value({"state": rollout["state"]}, {"latent": rollout["latent"]})
     assert all(isinstance(value, float) and torch.tensor(value).isfinite() for value in stats.values())
-    assert not torch.equal(before, after)
+    assert not torch.equal(before, values(agent, env, rollout))
 
 
-def test_state_survives_a_checkpoint_and_goes_on_alike(make: Maker, generator: torch.Generator, tmp_path) -> None:
-    env = PointMass(15)
+def test_state_survives_a_checkpoint_and_goes_on_alike(
+    make: Maker, skills: int, generator: torch.Generator, tmp_path: Path
+) -> None:
+    env = PointMass(15, skills=skills)
     agent = make(env, generator)
-    rollout = collected(agent, env)
-    agent.update(rollout)
+    agent.update(collected(agent, env))
     checkpoint.save(tmp_path / "agent", agent.state_dict())
     other = make(env, torch.Generator().manual_seed(99))
     other.load_state_dict(checkpoint.load(tmp_path / "agent"))
-    other.generator.set_state(generator.get_state())  # type: ignore[attr-defined]
-    assert agent.update(rollout) == other.update(rollout)
+    drawn = generator.get_state()
+    stats = agent.update(collected(agent, env))
+    other.generator.set_state(drawn)  # type: ignore[attr-defined]
+    assert stats == other.update(collected(other, env))
     obs = tensors(env.reset(seed=1)[0])
     assert torch.equal(agent.act(obs).action, other.act(obs).action)
+
+
+def test_n_and_n_more_iterations_are_2n_bit_for_bit(make: Maker, tmp_path: Path) -> None:
+    def runner(folder: Path, iterations: int, seed: int = 0) -> Runner:
+        weights = {"style": 1.0} if make is make_calm else {"style": 1.0, "skill": 0.5}
+        samples = iterations * 32 * 8
+        return make_runner(folder, make=make, skills=3, seed=seed, samples=samples, reward_weights=weights)
+
+    runner(tmp_path / "whole", 4).run()
+    runner(tmp_path / "half", 2).run()
+    second = runner(tmp_path / "half", 4, seed=77)
+    second.load(tmp_path / "half")
+    second.run()
+    assert equal(checkpoint.load(tmp_path / "whole"), checkpoint.load(tmp_path / "half"))

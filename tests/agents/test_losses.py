@@ -4,8 +4,8 @@ import pytest
 import torch
 from torch.distributions import Independent, Normal, kl_divergence
 
-from murmillo.agents.ase.losses import diversity_loss, encoder_loss, skill_reward
 from murmillo.agents.common import losses
+from murmillo.agents.common.skill_discovery import diversity_loss, encoder_loss, skill_reward
 
 T = torch.tensor
 

@@ -2,7 +2,7 @@ import pytest
 import torch
 
 from murmillo.agents.common.errors import AgentError
-from murmillo.agents.common.networks import GaussianPolicy, linear, mlp
+from murmillo.agents.common.networks import Dropout, GaussianPolicy, linear, mlp
 
 
 def policy(seed: int = 0, **changes: object) -> GaussianPolicy:
@@ -27,6 +27,23 @@ def test_initial_weights_and_biases(generator: torch.Generator) -> None:
 
 def test_layers_end_in_a_rectifier(generator: torch.Generator) -> None:
     assert mlp([3, 7, 6], generator)(torch.randn(50, 3)).min() == 0
+
+
+def test_dropout_hides_a_share_and_keeps_the_mean_while_training_only(generator: torch.Generator) -> None:
+    dropout, x = Dropout(0.2, generator), torch.ones(40_000)
+    state = torch.get_rng_state()
+    y = dropout(x)
+    assert set(y.unique().tolist()) == {0.0, 1.25}
+    assert (y == 0).float().mean().item() == pytest.approx(0.2, abs=0.01)
+    assert torch.equal(dropout.eval()(x), x)
+    assert torch.equal(state, torch.get_rng_state())  # a checkpoint does not keep torch's own
+
+
+def test_dropout_stands_before_every_layer(generator: torch.Generator) -> None:
+    names = [type(layer).__name__ for layer in mlp([3, 7, 6], generator, dropout=0.1)]
+    assert names == ["Dropout", "Linear", "ReLU"] * 2
+    with pytest.raises(AgentError, match=r"dropout=1\.0"):
+        mlp([3, 7], generator, dropout=1.0)
 
 
 def test_shapes_std_and_scale(generator: torch.Generator) -> None:

@@ -1,5 +1,7 @@
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 import torch
 from gymnasium.vector import AutoresetMode
@@ -74,6 +76,22 @@ def test_named_rewards_are_weighted_and_logged(tmp_path: Path) -> None:
     means = runner._reward(rollout)
     total = 2 * means["reward/task"] + means["reward/style"] + 0.5 * means["reward/skill"]
     assert means["reward/total"] == pytest.approx(total, rel=1e-5)
+
+
+def test_side_rewards_of_the_environment_count_where_they_are_weighted(tmp_path: Path) -> None:
+    for weights in ({"style": 1.0, "skill": 0.5}, {"style": 1.0, "skill": 0.5, "residual": 0.1}):
+        runner = make_runner(tmp_path, reward_weights=weights)
+        step = runner.env.step
+
+        def helped(actions: np.ndarray, step: Any = step) -> Any:
+            *results, infos = step(actions)
+            return *results, {**infos, "side_rewards": {"residual": np.full(32, 0.7, np.float32)}}
+
+        runner.env.step = helped  # type: ignore[method-assign]
+        means = runner._reward(runner._collect())
+        assert means["reward/residual"] == pytest.approx(0.7)
+        total = means["reward/style"] + 0.5 * means["reward/skill"] + weights.get("residual", 0.0) * 0.7
+        assert means["reward/total"] == pytest.approx(total, rel=1e-5)
 
 
 @pytest.mark.parametrize("weights", [{"style": 1.0}, {"style": 1.0, "skill": 0.5, "styl": 1.0}])

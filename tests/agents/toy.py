@@ -1,5 +1,7 @@
 """A vector environment for tests: point masses on a plane, whose demonstrations move straight at one speed."""
 
+import dataclasses
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -11,7 +13,10 @@ from torch import Tensor
 
 from murmillo.agents.ase.agent import ASE
 from murmillo.agents.ase.config import ASEConfig
+from murmillo.agents.case.agent import CASE
+from murmillo.agents.case.config import CASEConfig
 from murmillo.agents.common.discriminator import DiscriminatorConfig
+from murmillo.agents.common.interface import Agent
 from murmillo.agents.common.ppo import PPOConfig
 from murmillo.agents.common.runner import Runner, RunnerConfig
 
@@ -24,10 +29,18 @@ class PointMass(VectorEnv):
 
     Reward: minus the distance of the speed from that of the demonstrations. Terminates far from the origin, truncates
     after `episode_steps`. `infos["final_obs"]` holds the true successors of all worlds, as arrays.
+
+    The demonstrations of skill c of K move into the c-th of K equal sectors; those of the one skill move anywhere.
     """
 
-    def __init__(self, num_envs: int, window: int = 3, episode_steps: int = 16, bound: float = 1.2) -> None:
+    def __init__(
+        self, num_envs: int, window: int = 3, episode_steps: int = 16, bound: float = 1.2, skills: int = 1
+    ) -> None:
         self.num_envs = num_envs
+        self.skills = skills
+        self.skill = np.zeros(num_envs, np.int64)
+        self.skill_weights = torch.ones(skills)
+        self.ground_contact = True
         self.window = window
         self.episode_steps = episode_steps
         self.bound = bound
@@ -35,7 +48,7 @@ class PointMass(VectorEnv):
         self.single_observation_space = spaces.Dict(
             {
                 "state": spaces.Box(-np.inf, np.inf, (4,), np.float32),
-                "skill": spaces.Discrete(1),
+                "skill": spaces.Discrete(skills),
                 "window": spaces.Box(-np.inf, np.inf, (window, 4), np.float32),
             }
         )
@@ -70,19 +83,32 @@ class PointMass(VectorEnv):
         start[:, :2] = torch.rand(len(start), 2, generator=self.rng).numpy() - 0.5
         self.history[worlds] = start[:, None]
         self.clock[worlds] = 0
+        if self.skills > 1 and len(start):
+            drawn = torch.multinomial(self.skill_weights, len(start), replacement=True, generator=self.rng)
+            self.skill[worlds] = drawn.numpy()
+
+    def set_skill_weights(self, weights: Tensor) -> None:
+        self.skill_weights = weights
+
+    def set_ground_contact(self, allowed: bool) -> None:
+        self.ground_contact = allowed
 
     def _obs(self) -> dict[str, np.ndarray]:
         window = self.history.copy()
-        return {"state": window[:, -1], "skill": np.zeros(self.num_envs, np.int64), "window": window}
+        return {"state": window[:, -1], "skill": self.skill.copy(), "window": window}
 
-    def demonstrations(self, n: int, generator: torch.Generator, skill: Tensor | None = None) -> dict[str, Tensor]:
-        angle = 2 * torch.pi * torch.rand(n, 1, generator=generator)
+    def demonstrations(
+        self, n: int, generator: torch.Generator, skill: Tensor | None = None, frames: int | None = None
+    ) -> dict[str, Tensor]:
+        if skill is None:
+            skill = torch.randint(self.skills, (n,), generator=generator) if self.skills > 1 else torch.zeros(n).long()
+        angle = 2 * torch.pi / self.skills * (skill[:, None] + torch.rand(n, 1, generator=generator))
         velocity = SPEED * torch.cat([angle.cos(), angle.sin()], 1)
         start = torch.rand(n, 2, generator=generator) - 0.5
-        times = DT * torch.arange(self.window)
+        times = DT * torch.arange(frames or self.window)
         position = start[:, None] + times[None, :, None] * velocity[:, None]
         window = torch.cat([position, velocity[:, None].expand_as(position)], 2)
-        return {"window": window, "skill": torch.zeros(n, dtype=torch.int64)}
+        return {"window": window, "skill": skill}
 
     def imitation_pairs(self, n: int, generator: torch.Generator) -> dict[str, Tensor]:
         state = self.demonstrations(n, generator)["window"][:, -1]
@@ -92,12 +118,14 @@ class PointMass(VectorEnv):
         return {
             "history": torch.from_numpy(self.history.copy()),
             "clock": torch.from_numpy(self.clock.copy()),
+            "skill": torch.from_numpy(self.skill.copy()),
             "rng": self.rng.get_state(),
         }
 
     def load_state_dict(self, state: dict[str, Tensor]) -> None:
         self.history = state["history"].numpy().copy()
         self.clock = state["clock"].numpy().copy()
+        self.skill = state["skill"].numpy().copy()
         self.rng.set_state(state["rng"])
 
 
@@ -123,12 +151,42 @@ def make_ase(env: PointMass, generator: torch.Generator, **changes: Any) -> ASE:
     return ASE(env, env.demonstrations, small_ase(**changes), generator)
 
 
-def make_runner(folder: Any, *, num_envs: int = 32, seed: int = 0, agent: dict | None = None, **config: Any) -> Runner:
-    """A runner of small ASE on the toy; `agent` changes the agent's config, the rest the runner's."""
+def small_case(**changes: Any) -> CASEConfig:
+    """C·ASE with networks and steps that fit the toy, focal sampling from the first iteration and no curriculum."""
+    ase = small_ase()
+    fields = {
+        "latent_dim": ase.latent_dim,
+        "latent_steps": ase.latent_steps,
+        "label_dim": 8,
+        "window": ase.window,
+        "encoder_hidden": (32, 32),
+        "focal_start": 0,
+        "upright_iterations": 0,
+        "ppo": ase.ppo,
+        "discriminator": dataclasses.replace(ase.discriminator, dropout=0.2),
+    }
+    return CASEConfig(**{**fields, **changes})
+
+
+def make_case(env: PointMass, generator: torch.Generator, **changes: Any) -> CASE:
+    return CASE(env, env.demonstrations, small_case(**changes), generator)
+
+
+def make_runner(
+    folder: Any,
+    *,
+    make: Callable[..., Agent] = make_ase,
+    num_envs: int = 32,
+    skills: int = 1,
+    seed: int = 0,
+    agent: dict | None = None,
+    **config: Any,
+) -> Runner:
+    """A runner of a small agent on the toy; `agent` changes the agent's config, the rest the runner's."""
     generator = torch.Generator().manual_seed(seed)
-    env = PointMass(num_envs)
+    env = PointMass(num_envs, skills=skills)
     settings = RunnerConfig(**{"samples": 32 * 8 * 4, "horizon": 8, "lam": 0.9, "gamma": 0.9, **config})
-    return Runner(env, make_ase(env, generator, **(agent or {})), settings, generator, folder)
+    return Runner(env, make(env, generator, **(agent or {})), settings, generator, folder)
 
 
 def equal(a: object, b: object) -> bool:

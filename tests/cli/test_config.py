@@ -19,10 +19,18 @@ def choices(group: str) -> list[str]:
     return sorted(Path(str(path)).stem for path in files("murmillo.conf").joinpath(group).iterdir())
 
 
+UNFIT = {"ase": {"no_focal"}, "calm": {"neither", "no_diversity", "no_skill_discovery", "no_focal"}, "case": set()}
+"""Ablations of what an agent does not have."""
+
+
 @pytest.mark.parametrize("agent", choices("agent"))
 @pytest.mark.parametrize("budget", choices("budget"))
 @pytest.mark.parametrize("ablation", choices("ablation"))
 def test_every_combination_of_files_composes(agent: str, budget: str, ablation: str) -> None:
+    if ablation in UNFIT[agent]:
+        with pytest.raises(CommandError, match=r"ablation=\w+: it sets agent\.\w+, which the chosen agent has not"):
+            compose_train([f"agent={agent}", f"budget={budget}", f"ablation={ablation}"])
+        return
     config = compose_train([f"agent={agent}", f"budget={budget}", f"ablation={ablation}"])
     assert isinstance(config.agent, AGENTS[agent].config)
     assert config.choices == {"agent": agent, "budget": budget, "ablation": ablation}
@@ -32,7 +40,17 @@ def test_every_combination_of_files_composes(agent: str, budget: str, ablation: 
 def test_all_groups_are_covered() -> None:
     assert choices("agent") == sorted(AGENTS)
     assert choices("budget") == ["laptop", "paper", "smoke"]
-    assert choices("ablation") == ["neither", "no_diversity", "no_skill_discovery", "none"]
+    assert choices("ablation") == [
+        "neither",
+        "no_diversity",
+        "no_focal",
+        "no_masking",
+        "no_skill_discovery",
+        "none",
+        "residual",
+    ]
+    known = {f"{agent}_{budget}" for agent in choices("agent") for budget in choices("budget")}
+    assert set(choices("agent_budget")) <= known
 
 
 def test_paper_budget_has_table_2() -> None:
@@ -60,6 +78,17 @@ def test_ablations() -> None:
     neither = compose_train(["ablation=neither"])
     assert (neither.agent.diversity, neither.agent.skill_discovery) == ("none", False)
     assert neither.runner.reward_weights["skill"] == 0.0
+    assert compose_train(["agent=case", "ablation=no_focal"]).agent.focal == "none"
+    assert compose_train(["agent=case", "ablation=no_masking"]).agent.discriminator.dropout == 0.0
+    residual = compose_train(["ablation=residual"])
+    assert (residual.env.residual_force, residual.runner.reward_weights["residual"]) == (50.0, 0.1)
+
+
+def test_a_budget_has_its_own_values_for_an_agent() -> None:
+    paper, smoke = (compose_train(["agent=case", f"budget={budget}"]) for budget in ("paper", "smoke"))
+    assert (paper.runner.samples, paper.agent.focal_start, paper.agent.upright_iterations) == (1.5e9, 2500, 15_000)
+    assert smoke.agent.focal_start < smoke.runner.samples / (smoke.num_envs * smoke.runner.horizon)
+    assert compose_train(["agent=case", "agent.focal_start=7"]).agent.focal_start == 7
 
 
 def test_top_settings_reach_the_environment() -> None:
@@ -109,6 +138,7 @@ def test_a_wrong_word_is_named_in_one_line(word: str, parts: tuple[str, ...]) ->
         (["env.window=3"], ("env.window=3", "agent.window=10")),
         (["env.autoreset=next_step"], ("env.autoreset=next_step", "same_step")),
         (["threads=-1"], ("threads=-1",)),
+        (["+runner.reward_weights.residual=0.1"], ("runner.reward_weights.residual=0.1", "env.residual_force")),
     ],
 )
 def test_an_impossible_combination_is_refused(words: list[str], parts: tuple[str, ...]) -> None:

@@ -53,6 +53,23 @@ def test_report_has_the_figures(run_folder: Path) -> None:
     assert "fall_rate.png" not in text
 
 
+def test_report_says_whether_the_label_is_obeyed(run_folder: Path) -> None:
+    assert "as it is told" not in report.write(run_folder).read_text()
+    measures = runs.read_json(run_folder / runs.MEASURES)
+    measures["untrained"] |= {"heads": {"right": 0.5}}
+    measures["trained"] |= {"heads": {"right": 0.6, "other": 0.25}, "residual_share": 0.0123}
+    runs.write_json(run_folder / runs.MEASURES, measures)
+    runs.write_json(
+        run_folder / runs.SKILLS, {"idle": {"share": 0.3, "score": 0.9}, "kick": {"share": 0.7, "score": 0.1}}
+    )
+    text = report.write(run_folder).read_text()
+    assert "| before training | 0.500 | - |" in text
+    assert "| after training | 0.600 | 0.250 |" in text
+    assert "an even one is 50.00 %" in text
+    assert text.index("| kick | 70.00 % | 0.100 |") < text.index("| idle | 30.00 % | 0.900 |")
+    assert "Residual forces: after training, 1.23 % of the PD control" in text
+
+
 def test_report_says_why_there_is_no_video(run_folder: Path) -> None:
     runs.write_json(run_folder / runs.FILMING, {"reason": "no OpenGL"})
     assert "No video: no OpenGL" in report.write(run_folder).read_text()

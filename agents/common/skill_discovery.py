@@ -1,4 +1,4 @@
-"""ASE's own objectives as pure functions: encoder (eqs. 12, 13), skill reward (eq. 10), diversity (eq. 15).
+"""Skill discovery as pure functions: ASE's encoder (eqs. 12, 13), skill reward (eq. 10) and diversity (eq. 15).
 
 Everywhere `mu_q` `[..., Z]` is the encoder's mean and `z` `[..., Z]` the latent, both of unit length.
 """

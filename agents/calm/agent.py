@@ -1,0 +1,197 @@
+"""CALM: conditional adversarial latent models (Tessler et al. 2023), its low-level training (section 5)."""
+
+from typing import Any
+
+import torch
+from gymnasium.vector import VectorEnv
+from torch import Tensor
+
+from murmillo.agents.calm.condition import LatentCondition
+from murmillo.agents.calm.config import CALMConfig
+from murmillo.agents.calm.encoder import MotionEncoder
+from murmillo.agents.calm.losses import alignment_loss, uniformity_loss
+from murmillo.agents.calm.motions import MotionSequence
+from murmillo.agents.common.dimensions import dimensions
+from murmillo.agents.common.discriminator import Discriminator, Windows, discriminator_loss, style_reward
+from murmillo.agents.common.interface import Demonstrations, Obs, Step
+from murmillo.agents.common.latents import sample_sphere
+from murmillo.agents.common.ppo import PPO, ActorCritic, Minibatch
+from murmillo.agents.common.replay import Replay
+from murmillo.agents.common.rollout import Rollout
+from murmillo.agents.common.training import Means, adam, adam_state, load_adam_state, load_module, named
+
+
+class CALM:
+    """A policy pi(a | s, z) that follows the motion M whose encoding z = E(M) it is given."""
+
+    needs = frozenset({"state", "next_state", "next_window"})
+
+    def __init__(
+        self, env: VectorEnv, demonstrations: Demonstrations, config: CALMConfig, generator: torch.Generator
+    ) -> None:
+        """
+        Args:
+            env: read for its spaces and number of worlds only.
+            demonstrations: windows of the reference motions, of as many frames as asked for.
+            config: hyperparameters.
+            generator: draws weights, motions, noise and minibatches.
+
+        Raises:
+            AgentError: environment or demonstrations give no windows of `config.window` frames.
+        """
+        state_dim, action_dim = dimensions(env, demonstrations, config.window)
+        self.config = config
+        self.demonstrations = demonstrations
+        self.generator = generator
+        self.model = ActorCritic(state_dim, action_dim, config.latent_dim, config.ppo, generator)
+        self.encoder = MotionEncoder(state_dim, config.latent_dim, config.encoder, generator)
+        self.ppo = PPO(self.model, config.ppo, self.encoder.parameters())
+        condition = LatentCondition(config.latent_dim, config.discriminator_style_hidden, generator)
+        self.discriminator = Discriminator(config.window, state_dim, config.discriminator, generator, condition)
+        self._observe_demonstrations()
+        self.optimizer = adam((self.discriminator.parameters(), config.discriminator.learning_rate))
+        self.replay = Replay(config.discriminator.replay_size, config.discriminator.replay_keep)
+        self.motions = MotionSequence(
+            env.num_envs, config.latent_dim, config.latent_steps, generator, self._draw_motions, self.encoder
+        )
+
+    @torch.no_grad()
+    def encode(self, window: Tensor) -> Tensor:
+        """z = E(M): latents `[B, Z]` of motions `[B, F, D]`, F = `config.encoder.frames`, oldest frame first."""
+        return self.encoder(Windows(window))
+
+    @torch.no_grad()
+    def random_condition(self, n: int) -> Tensor:
+        """Encodings `[n, Z]` of random motions, for a policy that is fitted to clips."""
+        return self.encoder(self._draw_motions(n))
+
+    def follow(self, latent: Tensor) -> None:
+        """Act under these latents `[N, Z]`, or `[Z]` in all worlds, until the next `reset`."""
+        self.motions.hold(latent)
+
+    def act(self, obs: Obs, *, deterministic: bool = False) -> Step:
+        latent, motion = self.motions.step()
+        action, log_prob = self.model.act(obs["state"], latent, self.generator, deterministic)
+        mask = self.motions.mask(motion)
+        extras = {"latent": latent, "motion": motion}
+        return Step(action, log_prob, extras if mask is None else extras | {"mask": mask})
+
+    def value(self, obs: Obs, extras: dict[str, Tensor]) -> Tensor:
+        return self.model.value(obs["state"], extras["latent"])
+
+    def reset(self, env_ids: Tensor) -> None:
+        self.motions.reset(env_ids)
+
+    @torch.no_grad()
+    def rewards(self, rollout: Rollout) -> dict[str, Tensor]:
+        """r = -log(1 - D(s, s' | z)) of eq. 4, `[T, N]`."""
+        names = [name for name in ("next_window", "latent", "mask") if name in rollout]
+        logits = [self.discriminator.logits(*row) for row in zip(*(rollout[name] for name in names), strict=True)]
+        return {"style": style_reward(torch.stack(logits))}
+
+    def update(self, rollout: Rollout) -> dict[str, float]:
+        """Eq. 7 for the discriminator; eq. 4 with eqs. 5 and 6 for policy, critic and encoder."""
+        config, generator, means = self.config, self.generator, Means()
+        windows, latents = rollout.flat("next_window"), rollout.flat("latent")
+        masks = rollout.flat("mask") if "mask" in rollout else None
+        k = config.discriminator.minibatch
+
+        for _ in range(config.discriminator.updates):
+            rows = torch.randint(len(windows), (k,), generator=generator)
+            agent = Windows(windows[rows], latents[rows], None if masks is None else masks[rows])
+            replay = Windows(**self.replay.sample(k, generator)) if len(self.replay) else agent
+            demonstration = self._encoded_demonstration(k)
+            negative = self._negative(demonstration)
+            loss = discriminator_loss(self.discriminator, agent, replay, demonstration, negative)
+            self.optimizer.zero_grad()
+            torch.stack(list(loss.parts.values())).sum().backward()
+            self.optimizer.step()
+            means.add({**loss.parts, **loss.scores})
+        means.add({"agent_mismatched_score": self._mismatched_score(agent)})
+
+        ppo = self.ppo.update(
+            rollout,
+            generator,
+            fields=("motion",),
+            condition=self._encode_batch,
+            extra_loss=self._structure,
+        )
+        remembered = {"window": windows, "condition": latents}
+        self.replay.add(remembered if masks is None else remembered | {"mask": masks}, generator)
+        self.discriminator.normalizer.update(rollout["next_state"])
+        self._observe_demonstrations()
+        self.motions.encode_again()
+        return named("discriminator", means.result()) | named("ppo", ppo)
+
+    def _encode_batch(self, batch: Minibatch) -> Tensor:
+        """z = E(M) `[B, Z]` of a minibatch's motions, with gradient; each motion is encoded once."""
+        motions, row = batch["motion"].unique(return_inverse=True)
+        return self.encoder(self.motions.of(motions))[row]
+
+    def _structure(self, batch: Minibatch, mean: Tensor) -> dict[str, Tensor]:
+        """Eqs. 5 and 6 on motions and their overlapping neighbours."""
+        config = self.config.encoder
+        longer = self._draw_motions(config.minibatch, config.frames + config.shift)
+        shift = torch.randint(config.shift + 1, (config.minibatch, 1), generator=self.generator)
+        frame = torch.arange(config.frames) + config.shift - shift
+        rows = torch.arange(config.minibatch)[:, None]
+        z = self.encoder(Windows(longer.window[:, config.shift :], mask=longer.mask))
+        overlapping = self.encoder(Windows(longer.window[rows, frame], mask=longer.mask))
+        return {
+            "alignment": config.alignment_weight * alignment_loss(z, overlapping),
+            "uniformity": config.uniformity_weight * uniformity_loss(z),
+        }
+
+    def _draw_motions(self, n: int, frames: int | None = None) -> Windows:
+        drawn = self.demonstrations(n, self.generator, frames=frames or self.config.encoder.frames)
+        return Windows(drawn["window"], mask=drawn.get("mask"))
+
+    @torch.no_grad()
+    def _encoded_demonstration(self, n: int) -> Windows:
+        """A window out of each of n motions, with the motion's encoding."""
+        config = self.config
+        motion = self._draw_motions(n)
+        first = torch.randint(config.encoder.frames - config.window + 1, (n, 1), generator=self.generator)
+        window = motion.window[torch.arange(n)[:, None], first + torch.arange(config.window)]
+        return Windows(window, self.encoder(motion), motion.mask)
+
+    def _negative(self, demonstration: Windows) -> Windows | None:
+        """True windows with a latent that is not theirs."""
+        if self.config.negatives == "none":
+            return None
+        z = demonstration.condition
+        assert z is not None
+        if self.config.negatives == "sphere":
+            return demonstration._replace(condition=sample_sphere(len(z), z.shape[1], self.generator))
+        return demonstration._replace(condition=z.roll(1, 0))  # the rows are drawn independently
+
+    @torch.no_grad()
+    def _mismatched_score(self, agent: Windows) -> Tensor:
+        """The discriminator's mean probability for the agent's windows under latents that they did not follow."""
+        assert agent.condition is not None
+        return self.discriminator.logits(agent.window, agent.condition.roll(1, 0), agent.mask).sigmoid().mean()
+
+    def _observe_demonstrations(self) -> None:
+        """The discriminator's and the encoder's normalisers see the clips."""
+        drawn = self.demonstrations(self.config.discriminator.minibatch, self.generator)
+        mask = drawn.get("mask")
+        self.discriminator.observe(drawn["window"], mask)
+        self.encoder.normalizer.update(drawn["window"], None if mask is None else mask[:, None])
+
+    def state_dict(self) -> dict[str, Any]:
+        return {
+            "ppo": self.ppo.state_dict(),
+            "encoder": self.encoder.state_dict(),
+            "discriminator": self.discriminator.state_dict(),
+            "optimizer": adam_state(self.optimizer),
+            "replay": self.replay.state_dict(),
+            "latents": self.motions.state_dict(),
+        }
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        self.ppo.load_state_dict(state["ppo"])
+        load_module(self.encoder, state["encoder"], "encoder")
+        load_module(self.discriminator, state["discriminator"], "discriminator")
+        load_adam_state(self.optimizer, state["optimizer"])
+        self.replay.load_state_dict(state["replay"])
+        self.motions.load_state_dict(state["latents"])

@@ -1,0 +1,92 @@
+"""The motions that the worlds are told to follow, and their encodings."""
+
+from collections.abc import Callable
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from murmillo.agents.common.discriminator import Windows
+from murmillo.agents.common.latents import LatentSequence
+
+
+class MotionSequence:
+    """Every world's sequence of motions, each followed for some time; the latent of a world encodes its motion.
+
+    After every update of the encoder `encode_again` renews the encodings, so that an action and its log probability
+    belong to the encoder of the same iteration. (In the released code they may be older, which breaks PPO's ratios.)
+    """
+
+    def __init__(
+        self,
+        num_envs: int,
+        latent_dim: int,
+        steps: tuple[int, int],
+        generator: torch.Generator,
+        draw: Callable[[int], Windows],
+        encode: Callable[[Windows], Tensor],
+    ) -> None:
+        """
+        Args:
+            num_envs: N.
+            latent_dim: Z.
+            steps: shortest and longest time that a motion is followed [control steps].
+            generator: draws the durations.
+            draw: gives n motions [n, F, D].
+            encode: gives their latents [n, Z].
+        """
+        self._draw, self._encode = draw, encode
+        # all motions that were followed since `encode_again`; a rollout speaks of them by their rows
+        self._window = torch.zeros(0)
+        self._masks: Tensor | None = None
+        self._number = torch.zeros(num_envs, dtype=torch.int64)
+        self._latents = LatentSequence(num_envs, latent_dim, generator, *steps, draw=self._begin)
+
+    def step(self) -> tuple[Tensor, Tensor]:
+        """The latents of this step [N, Z] and the number [N] of the motion that each encodes."""
+        return self._latents.step(), self._number.clone()
+
+    def reset(self, env_ids: Tensor) -> None:
+        """Other motions for these worlds, [n] int64."""
+        self._latents.reset(env_ids)
+
+    def hold(self, latent: Tensor) -> None:
+        """These latents [N, Z], or [Z] for all worlds, until the next `reset`; no motion stands behind them."""
+        self._latents.hold(latent)
+
+    def of(self, numbers: Tensor) -> Windows:
+        """The motions [n, F, D] of these numbers [n], which `encode_again` gives out anew."""
+        return Windows(self._window[numbers], mask=self.mask(numbers))
+
+    def mask(self, numbers: Tensor) -> Tensor | None:
+        """What these motions [n] leave out, [n, D] bool; None where no motion leaves anything out."""
+        return None if self._masks is None else self._masks[numbers]
+
+    @torch.no_grad()
+    def encode_again(self) -> None:
+        """Forget the motions that no world follows any more, and encode the others anew."""
+        followed = self.of(self._number)
+        self._keep(followed)
+        self._latents.latent.copy_(self._encode(followed))
+
+    @torch.no_grad()
+    def _begin(self, env_ids: Tensor) -> Tensor:
+        new = self._draw(len(env_ids))
+        self._number[env_ids] = len(self._window) + torch.arange(len(env_ids))
+        self._window = torch.cat([self._window, new.window]) if len(self._window) else new.window
+        if new.mask is not None:
+            self._masks = new.mask if self._masks is None else torch.cat([self._masks, new.mask])
+        return self._encode(new)
+
+    def _keep(self, followed: Windows) -> None:
+        self._window, self._masks = followed.window, followed.mask
+        self._number = torch.arange(len(self._number))
+
+    def state_dict(self) -> dict[str, Any]:
+        followed = self.of(self._number)
+        mask = {} if followed.mask is None else {"mask": followed.mask}
+        return {"window": followed.window, **mask, "latents": self._latents.state_dict()}
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        self._keep(Windows(state["window"].clone(), mask=state.get("mask")))
+        self._latents.load_state_dict(state["latents"])

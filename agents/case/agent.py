@@ -1,0 +1,244 @@
+"""C·ASE: conditional adversarial skill embeddings (Dou et al. 2023). A policy that does as its label says."""
+
+from typing import Any
+
+import torch
+from gymnasium import spaces
+from gymnasium.vector import VectorEnv
+from torch import Tensor
+
+from murmillo.agents.case.config import CASEConfig
+from murmillo.agents.case.focal import FocalSampling
+from murmillo.agents.case.networks import Encoder, LabelEmbedding, SkillHeads
+from murmillo.agents.common.dimensions import dimensions
+from murmillo.agents.common.discriminator import Discriminator, Windows, discriminator_loss, style_reward
+from murmillo.agents.common.errors import AgentError
+from murmillo.agents.common.interface import Demonstrations, Obs, Step
+from murmillo.agents.common.latents import LatentSequence, sample_sphere
+from murmillo.agents.common.masks import FeatureMasks
+from murmillo.agents.common.ppo import PPO, ActorCritic, Minibatch
+from murmillo.agents.common.replay import Replay
+from murmillo.agents.common.rollout import Rollout
+from murmillo.agents.common.skill_discovery import diversity_loss, encoder_loss, skill_reward
+from murmillo.agents.common.training import Means, adam, adam_state, load_adam_state, load_module, named
+
+
+class CASE:
+    """A policy pi(a | s, z, c) that behaves like the demonstrations of skill c, and differently for every latent z.
+
+    The label c is the environment's observation "skill": who sets it commands the character, at any step. While
+    training it is drawn at the beginning of an episode, independently of the state (condition randomisation, appendix
+    A.4.2). Skeletal residual forces, where the environment has them, are a part of the action like any other.
+    """
+
+    needs = frozenset({"state", "next_state", "next_window"})
+
+    def __init__(
+        self, env: VectorEnv, demonstrations: Demonstrations, config: CASEConfig, generator: torch.Generator
+    ) -> None:
+        """
+        Args:
+            env: read for its spaces and number of worlds only.
+            demonstrations: windows of the reference motions, by label.
+            config: hyperparameters.
+            generator: draws weights, latents, noise and minibatches.
+
+        Raises:
+            AgentError: environment or demonstrations give no windows of `config.window` frames, or no labels.
+        """
+        state_dim, action_dim = dimensions(env, demonstrations, config.window)
+        labels = _labels(env)
+        self.config = config
+        self.demonstrations = demonstrations
+        self.generator = generator
+        self.latents = LatentSequence(env.num_envs, config.latent_dim, generator, *config.latent_steps)
+        self.label = LabelEmbedding(labels, config.label_dim, generator)
+        self.model = ActorCritic(state_dim, action_dim, config.latent_dim + config.label_dim, config.ppo, generator)
+        self.ppo = PPO(self.model, config.ppo, self.label.parameters())
+        heads = SkillHeads(labels)
+        self.discriminator = Discriminator(config.window, state_dim, config.discriminator, generator, heads)
+        self.encoder = Encoder(
+            config.window * state_dim, config.encoder_hidden, config.latent_dim, labels, config.label_dim, generator
+        )
+        self.optimizer = adam(
+            ([*self.discriminator.parameters(), *self.encoder.parameters()], config.discriminator.learning_rate)
+        )
+        self.replay = Replay(config.discriminator.replay_size, config.discriminator.replay_keep)
+        self.focal = FocalSampling(labels, config)
+        self.masks = FeatureMasks(demonstrations, labels)
+        self.iterations = 0
+        # known before the first update, lest that judges windows in raw units and every later one in other units
+        self._observe(self._draw_demonstrations())
+
+    def act(self, obs: Obs, *, deterministic: bool = False) -> Step:
+        """One step under the labels that are commanded now and the sequence of latents."""
+        latent, label = self.latents.step(), obs["skill"]
+        action, log_prob = self.model.act(obs["state"], self.condition(latent, label), self.generator, deterministic)
+        return Step(action, log_prob, {"latent": latent, "label": label})
+
+    def condition(self, latent: Tensor, label: Tensor) -> Tensor:
+        """What policy and critic are told beside the state: `[..., Z + label_dim]` from `[..., Z]` and `[...]`."""
+        return torch.cat([latent, self.label(label)], -1)
+
+    def value(self, obs: Obs, extras: dict[str, Tensor]) -> Tensor:
+        return self.model.value(obs["state"], self.condition(extras["latent"], extras["label"]))
+
+    def reset(self, env_ids: Tensor) -> None:
+        self.latents.reset(env_ids)
+
+    def directions(self) -> dict[str, Any]:
+        """Focal sampling draws the labels of new episodes; the curriculum (appendix A.5) begins without the ground."""
+        directions: dict[str, Any] = {}
+        if self.config.focal != "none":
+            directions["skill_weights"] = self.focal.probability
+        if self.config.upright_iterations:
+            directions["ground_contact"] = self.iterations >= self.config.upright_iterations
+        return directions
+
+    @torch.no_grad()
+    def rewards(self, rollout: Rollout) -> dict[str, Tensor]:
+        """r = -log(1 - D(s, s', c)) + beta log q(z | s, s', c) (section 3.1), as two terms `[T, N]`."""
+        config, style, skill = self.config, [], []
+        fields = ("next_window", "label", "latent")
+        for window, label, latent in zip(*(rollout[name] for name in fields), strict=True):
+            x = self.discriminator.prepare(window, self._masks_for(label))
+            style.append(style_reward(self.discriminator.judge(self.discriminator.features(x), label)))
+            skill.append(skill_reward(self.encoder(x, label), latent, config.kappa, config.skill_reward))
+        terms = {"style": torch.stack(style)}
+        return terms | {"skill": torch.stack(skill)} if config.skill_discovery else terms
+
+    def update(self, rollout: Rollout) -> dict[str, float]:
+        """Learn D by eq. 1 and q by eq. 2, pi and V by eq. 3, and what to practise by eq. 4."""
+        config, generator, means = self.config, self.generator, Means()
+        windows, labels, latents = (rollout.flat(name) for name in ("next_window", "label", "latent"))
+        k = config.discriminator.minibatch
+
+        for _ in range(config.discriminator.updates):
+            rows = torch.randint(len(windows), (k,), generator=generator)
+            agent = self._agent_windows(windows[rows], labels[rows])
+            replay = self._agent_windows(**self.replay.sample(k, generator)) if len(self.replay) else agent
+            loss = discriminator_loss(self.discriminator, agent, replay, self._draw_demonstrations())
+            losses = dict(loss.parts)
+            if config.skill_discovery:
+                mu_q = self.encoder(loss.agent_inputs, labels[rows])
+                losses["encoder"] = encoder_loss(mu_q, latents[rows], config.kappa)
+            self.optimizer.zero_grad()
+            torch.stack(list(losses.values())).sum().backward()
+            self.optimizer.step()
+            means.add({**losses, **loss.scores})
+
+        ppo = self.ppo.update(
+            rollout,
+            generator,
+            fields=("latent", "label"),
+            condition=lambda batch: self.condition(batch["latent"], batch["label"]),
+            extra_loss=self._diversity,
+        )
+        demonstrations = self._draw_demonstrations()
+        heads = self._practise(rollout, demonstrations)
+        self.iterations += 1
+        self.replay.add({"window": windows, "label": labels}, generator)
+        self.discriminator.normalizer.update(rollout["next_state"])
+        self._observe(demonstrations)
+        return (
+            named("discriminator", means.result())
+            | named("heads", heads)
+            | named("focal", self.focal.scalars())
+            | named("ppo", ppo)
+        )
+
+    def random_condition(self, n: int) -> Tensor:
+        """Random latents under random labels, `[n, Z + label_dim]`."""
+        label = torch.randint(len(self.focal.score), (n,), generator=self.generator)
+        return self.condition(sample_sphere(n, self.config.latent_dim, self.generator), label).detach()
+
+    def skill_tables(self) -> dict[str, Tensor]:
+        """Share of each skill in the practice, and the discriminator's mean score of it."""
+        return {"share": self.focal.probability, "score": self.focal.score}
+
+    @torch.no_grad()
+    def head_scores(self, rollout: Rollout) -> dict[str, Tensor]:
+        """Probabilities `[T, N]` that the commanded skill's head gives, "right", and the mean of all "other" heads."""
+        steps = zip(rollout["next_window"], rollout["label"], strict=True)
+        scores = [self._heads(self._agent_windows(window, label)) for window, label in steps]
+        return {name: torch.stack([score[name] for score in scores]) for name in scores[0]}
+
+    @torch.no_grad()
+    def _practise(self, rollout: Rollout, demonstrations: Windows) -> dict[str, float]:
+        """Focal sampling by the scores of this rollout; how far the heads of the discriminator hold the skills apart.
+
+        Returns:
+            means of the probabilities that the right heads and the others give to the agent and to demonstrations.
+        """
+        agent = self.head_scores(rollout)
+        started = self.iterations >= self.config.focal_start
+        self.focal.update(agent["right"].flatten(), rollout.flat("label"), active=started)
+        scores = {"agent": agent, "demonstration": self._heads(demonstrations)}
+        return {f"{who}_{head}": s.mean().item() for who, heads in scores.items() for head, s in heads.items()}
+
+    def _heads(self, windows: Windows) -> dict[str, Tensor]:
+        """Probabilities `[B]` that the head of each window's label gives, and the mean of all other heads, if any."""
+        x = self.discriminator.prepare(windows.window, windows.mask)
+        score = self.discriminator.head(self.discriminator.features(x)).sigmoid()
+        right = self.discriminator.condition.pick(score, windows.condition)
+        others = score.shape[1] - 1
+        return {"right": right} | ({"other": (score.sum(1) - right) / others} if others else {})
+
+    def _agent_windows(self, window: Tensor, label: Tensor) -> Windows:
+        return Windows(window, label, self._masks_for(label))
+
+    def _masks_for(self, label: Tensor) -> Tensor | None:
+        """What the demonstrations of the same skills leave out is left out too (adaptive masking, appendix A.5)."""
+        return self.masks.draw(len(label), self.generator, label)
+
+    def _draw_demonstrations(self) -> Windows:
+        k = self.config.discriminator.minibatch
+        drawn = self.demonstrations(k, self.generator, self.focal.draw(k, self.generator))
+        return Windows(drawn["window"], drawn["skill"], drawn.get("mask"))
+
+    def _observe(self, demonstrations: Windows) -> None:
+        self.discriminator.observe(demonstrations.window, demonstrations.mask)
+
+    def _diversity(self, batch: Minibatch, mean: Tensor) -> dict[str, Tensor]:
+        """The last term of eq. 3: another z' for each sample's z, under the same label."""
+        config = self.config
+        if config.diversity == "none":
+            return {}
+        z = sample_sphere(len(mean), config.latent_dim, self.generator)
+        other_mean = self.model.policy(batch["state"], self.condition(z, batch["label"]))
+        std = self.model.policy.log_std.exp()
+        loss = diversity_loss(mean, other_mean, batch["latent"], z, std, config.diversity)
+        return {"diversity": config.diversity_weight * loss}
+
+    def state_dict(self) -> dict[str, Any]:
+        return {
+            "ppo": self.ppo.state_dict(),
+            "label": self.label.state_dict(),
+            "discriminator": self.discriminator.state_dict(),
+            "encoder": self.encoder.state_dict(),
+            "optimizer": adam_state(self.optimizer),
+            "replay": self.replay.state_dict(),
+            "latents": self.latents.state_dict(),
+            "focal": self.focal.state_dict(),
+            "iterations": self.iterations,
+        }
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        load_module(self.label, state["label"], "label embedding")
+        self.ppo.load_state_dict(state["ppo"])
+        load_module(self.discriminator, state["discriminator"], "discriminator")
+        load_module(self.encoder, state["encoder"], "encoder")
+        load_adam_state(self.optimizer, state["optimizer"])
+        self.replay.load_state_dict(state["replay"])
+        self.latents.load_state_dict(state["latents"])
+        self.focal.load_state_dict(state["focal"])
+        self.iterations = state["iterations"]
+
+
+def _labels(env: VectorEnv) -> int:
+    """K, the labels that the environment may command."""
+    space = env.single_observation_space
+    skill = space.spaces.get("skill") if isinstance(space, spaces.Dict) else None
+    if not isinstance(skill, spaces.Discrete):
+        raise AgentError(f"C·ASE needs the label as a discrete observation 'skill'; the environment's is {skill}")
+    return int(skill.n)

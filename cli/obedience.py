@@ -1,0 +1,56 @@
+"""The report's section on an agent that is told its skill: does it do as told, and which skills does it practise?"""
+
+from typing import Any
+
+from murmillo.cli.evaluate import AGES
+
+
+def section(measures: dict[str, Any], skills: dict[str, dict[str, float]]) -> str:
+    """Markdown, empty for an agent without labels.
+
+    Args:
+        measures: of the policy's ages, with the mean scores that the discriminator's heads gave (`Measures.heads`).
+        skills: figures of each skill by name: the share of the practice that it gets, and its score.
+    """
+    heads = {age: measured["heads"] for age, measured in measures.items() if measured.get("heads")}
+    if not heads and not skills:
+        return ""
+    return "\n\n".join(["## Does it do as it is told?", *filter(None, (_heads(heads), _skills(skills)))])
+
+
+def _heads(heads: dict[str, dict[str, float]]) -> str:
+    if not heads:
+        return ""
+    rows = [f"| {AGES[age]} | {h['right']:.3f} | {_figure(h.get('other'))} |" for age, h in heads.items()]
+    return "\n".join(
+        [
+            "In the same episodes: the probability that the trained discriminator's head of the commanded skill gives "
+            "to the motion, and the mean of what the heads of all other skills give to it. A policy that obeys has the "
+            "first well above the second.",
+            "",
+            "| policy | head of the commanded skill | other heads |",
+            "|---|---:|---:|",
+            *rows,
+        ]
+    )
+
+
+def _skills(skills: dict[str, dict[str, float]]) -> str:
+    if not skills:
+        return ""
+    hardest_first = sorted(skills.items(), key=lambda item: -item[1]["share"])
+    rows = [f"| {name} | {100 * s['share']:.2f} % | {s['score']:.3f} |" for name, s in hardest_first]
+    return "\n".join(
+        [
+            f"Focal sampling gives each skill a share of the practice; an even one is {100 / len(skills):.2f} %. The "
+            "score is the discriminator's mean probability that the agent's motion under this label is a clip of it.",
+            "",
+            "| skill | share of the practice | score |",
+            "|---|---:|---:|",
+            *rows,
+        ]
+    )
+
+
+def _figure(value: float | None) -> str:
+    return "-" if value is None else f"{value:.3f}"
