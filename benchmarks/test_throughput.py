@@ -69,10 +69,12 @@ def test_rollout(benchmark, record):
     record("rollout", samples / benchmark.stats.stats.median, f"{WORLDS} worlds: environment, policy, storage")
 
 
-@pytest.mark.parametrize("budget", ["smoke", "laptop", "paper"])
-def test_training_iteration(benchmark, record, budget):
+@pytest.mark.parametrize(
+    ("agent", "budget"), [("ase", "smoke"), ("case", "smoke"), ("calm", "smoke"), ("ase", "laptop"), ("ase", "paper")]
+)
+def test_training_iteration(benchmark, record, agent, budget):
     """`paper` with an eighth of its worlds and minibatches, 16,384 samples instead of 131,072, and its own networks."""
-    runner = make_runner(budget, *PAPER_EIGHTH if budget == "paper" else ())
+    runner = make_runner(budget, f"agent={agent}", *(PAPER_EIGHTH if budget == "paper" else ()))
     samples = runner.env.num_envs * runner.config.horizon
 
     def iteration() -> None:
@@ -84,7 +86,7 @@ def test_training_iteration(benchmark, record, budget):
     iteration()
     benchmark.pedantic(iteration, rounds=1 if budget == "paper" else 5, iterations=1)
     note = f"{runner.env.num_envs} worlds, {samples:,} samples an iteration"
-    record(f"training iteration, {budget}", samples / benchmark.stats.stats.median, note)
+    record(f"training iteration, {agent}, {budget}", samples / benchmark.stats.stats.median, note)
 
 
 @pytest.mark.parametrize("kind", ["sync", "async"])

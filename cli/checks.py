@@ -1,5 +1,8 @@
 """Combinations of settings that cannot be, refused before anything is made."""
 
+from collections.abc import Iterator
+from typing import Any
+
 from murmillo.cli.config import TrainConfig
 from murmillo.cli.errors import CommandError
 from murmillo.envs.character import CONTROL_DT, load_character
@@ -49,21 +52,29 @@ def check_clips(config: TrainConfig) -> None:
     """Refuse what the clips do not allow.
 
     Raises:
-        CommandError: the window is longer than every clip, or the clips have another number of labels.
+        CommandError: a window is longer than every clip, or the clips have another number of labels.
         MotionError: the clips cannot be used.
     """
     clips = load_clips(config.env.motions, load_character(config.env.character))
     longest = max(clip.duration for clip in clips)
-    span = (config.agent.window - 1) * CONTROL_DT
-    if span > longest + 1e-6:
-        most = int(longest / CONTROL_DT + 1e-6) + 1
-        raise CommandError(
-            f"agent.window={config.agent.window}: {span:.2f} s are longer than every clip of "
-            f"motions={config.env.motions} (the longest has {longest:.2f} s); needs at most {most}"
-        )
+    for name, frames in _windows(config.agent):
+        span = (frames - 1) * CONTROL_DT
+        if span > longest + 1e-6:
+            most = int(longest / CONTROL_DT + 1e-6) + 1
+            raise CommandError(
+                f"{name}={frames}: {span:.2f} s are longer than every clip of "
+                f"motions={config.env.motions} (the longest has {longest:.2f} s); needs at most {most}"
+            )
     labels = sorted({clip.label for clip in clips})
     if config.skills is not None and config.skills != len(labels):
         raise CommandError(
             f"skills={config.skills}: the clips of motions={config.env.motions} have {len(labels)} labels "
             f"({', '.join(labels[:8])}{', …' if len(labels) > 8 else ''}); set skills={len(labels)} or null"
         )
+
+
+def _windows(agent: Any) -> Iterator[tuple[str, int]]:
+    """The lengths of motion [frames] that an agent sees, by the name of their setting."""
+    yield "agent.window", agent.window
+    if hasattr(agent, "encoder"):  # of whole motions: CALM
+        yield "agent.encoder.frames", agent.encoder.frames

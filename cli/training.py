@@ -70,12 +70,10 @@ def _begin(folder: Path, config: TrainConfig, resuming: bool) -> None:
 def _train(config: TrainConfig, env: HumanoidVectorEnv, folder: Path, resuming: bool) -> int:
     agent, generator = make_agent(config.choices["agent"], config.agent, env, config.seed)
     logger = Logger(folder)
-    # a weight of 0 leaves a term out, which the agent of an ablation does not give
-    weights = {term: weight for term, weight in config.runner.reward_weights.items() if weight}
     runner = Runner(
         env,
         agent,
-        dataclasses.replace(config.runner, reward_weights=weights),
+        config.runner,
         generator,
         folder / runs.LAST,
         meta=checkpoint_meta(config.choices["agent"], config.agent, env),

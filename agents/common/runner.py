@@ -31,7 +31,8 @@ class RunnerConfig:
         gamma: discount.
         lam: lambda of GAE and of TD(lambda).
         reward_weights: a weight for every reward term that the agent names, and for those of the environment that
-            should count: "task", its own reward, and what `infos["side_rewards"]` holds. 1 and beta = 0.5 are ASE's.
+            should count: "task", its own reward, and what `infos["side_rewards"]` holds; a weight of 0 may name a term
+            that there is not. 1 and beta = 0.5 are ASE's.
         checkpoint_minutes: save this often, and at the end.
         max_minutes: end after this much time, counted from `run`; None for no limit.
         watch: when to warn that the training fails.
@@ -172,6 +173,7 @@ class Runner:
         """Sum the weighted terms into "reward"; the mean of every term and of the sum, by name."""
         weights = {**dict.fromkeys(self._env_terms, 0.0), **self.config.reward_weights}
         terms = {**{name: rollout[name] for name in self._env_terms}, **self.agent.rewards(rollout)}
+        weights = {name: weight for name, weight in weights.items() if weight or name in terms}
         if terms.keys() != weights.keys():
             raise AgentError(
                 f"reward_weights names {', '.join(sorted(self.config.reward_weights))}, "

@@ -100,6 +100,10 @@ def test_weights_and_terms_must_match(tmp_path: Path, weights: dict[str, float])
         make_runner(tmp_path, reward_weights=weights).run()
 
 
+def test_a_weight_of_zero_may_name_what_there_is_not(tmp_path: Path) -> None:
+    make_runner(tmp_path, samples=1, reward_weights={"style": 1.0, "skill": 0.5, "residual": 0.0}).run()
+
+
 def test_nan_stops_with_one_line_and_spoils_no_checkpoint(tmp_path: Path) -> None:
     runner = make_runner(tmp_path / "c", samples=ITERATION)
     runner.run()

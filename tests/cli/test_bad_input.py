@@ -41,6 +41,7 @@ def assert_refused(done: tuple[int, str, str], *parts: str) -> None:
         (("train", "run.measured_worlds=0"), ("run.measured_worlds=0",)),
         (("train", "num_envs=4", "runner.horizon=32", "agent.ppo.minibatch=129"), ("agent.ppo.minibatch=129", "128")),
         (("train", "agent.window=2000"), ("agent.window=2000", "longer than every clip")),
+        (("train", "agent=calm", "agent.encoder.frames=300"), ("agent.encoder.frames=300", "longer than every clip")),
         (("train", "skills=99"), ("skills=99", "labels", "block_high")),
         (("train", "motions=nowhere"), ("nowhere",)),
         (("train", "run.name=a/b"), ("run.name=a/b",)),
