@@ -4,10 +4,11 @@ Importing it registers the ids; `gymnasium.make("murmillo.envs:murmillo/Imitatio
 """
 
 from murmillo.envs import _opengl  # noqa: F401  before anything that imports mujoco
+from murmillo.envs.config import EnvConfig
 from murmillo.envs.errors import MotionError, SuiteError
 from murmillo.envs.registration import register
 from murmillo.envs.single import HumanoidEnv
-from murmillo.envs.vector import EnvConfig, HumanoidVectorEnv
+from murmillo.envs.vector import HumanoidVectorEnv
 
 register()
 

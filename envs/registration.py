@@ -6,10 +6,11 @@ from typing import Any
 
 import gymnasium
 
+from murmillo.envs.config import EnvConfig
 from murmillo.envs.errors import SuiteError
 from murmillo.envs.single import HumanoidEnv
 from murmillo.envs.tasks import Imitation
-from murmillo.envs.vector import EnvConfig, HumanoidVectorEnv
+from murmillo.envs.vector import HumanoidVectorEnv
 
 
 def register() -> None:

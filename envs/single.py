@@ -5,8 +5,9 @@ from typing import Any, ClassVar, Literal
 import gymnasium
 import numpy as np
 
+from murmillo.envs.config import EnvConfig
 from murmillo.envs.tasks import Task
-from murmillo.envs.vector import EnvConfig, HumanoidVectorEnv
+from murmillo.envs.vector import HumanoidVectorEnv
 
 
 class HumanoidEnv(gymnasium.Env):

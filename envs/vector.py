@@ -1,7 +1,6 @@
 """N worlds of the character in one physics batch, as a gymnasium vector environment."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import gymnasium
@@ -13,14 +12,15 @@ from gymnasium.vector.utils import batch_space
 from torch import Tensor
 
 from murmillo.envs.character import Character, load_character
+from murmillo.envs.config import EnvConfig, check_config
 from murmillo.envs.errors import SuiteError
-from murmillo.envs.falls import FallConfig, FallDetector, count_every_contact
+from murmillo.envs.falls import FallDetector, count_every_contact
 from murmillo.envs.motion import MotionLibrary, load_clips
 from murmillo.envs.observations import character_state, state_dim
 from murmillo.envs.physics import State, make_physics
 from murmillo.envs.rendering import FrameRenderer, Window
 from murmillo.envs.residual import ResidualForces
-from murmillo.envs.starts import FALLEN, KINDS, RECOVERY, REFERENCE, StartConfig, StartSampler
+from murmillo.envs.starts import FALLEN, KINDS, RECOVERY, REFERENCE, StartSampler
 from murmillo.envs.tasks import Imitation, Task
 
 STATE_LIMIT = 1e3
@@ -30,37 +30,6 @@ RENDERED_WORLDS = 16
 
 _OWN_STATE = ("steps", "free_steps", "skill", "ended", "fell", "history")
 """What the environment itself carries from step to step, beside the physics and its generator."""
-
-
-@dataclass
-class EnvConfig:
-    """Everything that `gymnasium.make` takes beside the id.
-
-    Attributes:
-        motions: "builtin", a folder of clips or one file.
-        character: an MJCF of `assets/mjcf`.
-        window: frames of `state` that the observation `window` holds, the newest last; 1 leaves it out.
-        episode_steps: control steps until an episode is truncated (300 steps are 10 s).
-        residual_force: scale of the skeletal residual forces [N] (C.ASE section 3.1); 0 takes them out of the action.
-        residual_reward: form of their regularising reward (`ResidualForces.reward`), "sum" (paper) or "mean" (code).
-        autoreset: gymnasium's autoreset mode of the vector environment.
-        threads: CPU threads of the physics; 0 takes every CPU.
-        camera, width, height: of the frames of `render_mode="rgb_array"`.
-    """
-
-    motions: str = "builtin"
-    character: str = "sword_shield"
-    window: int = 1
-    episode_steps: int = 300
-    residual_force: float = 0.0
-    residual_reward: Literal["sum", "mean"] = "sum"
-    autoreset: Literal["same_step", "next_step", "disabled"] = "same_step"
-    threads: int = 0
-    camera: str = "track"
-    width: int = 640
-    height: int = 480
-    fall: FallConfig = field(default_factory=FallConfig)
-    starts: StartConfig = field(default_factory=StartConfig)
 
 
 class HumanoidVectorEnv(VectorEnv):
@@ -96,7 +65,7 @@ class HumanoidVectorEnv(VectorEnv):
     ) -> None:
         """Raises SuiteError (MotionError for clips) naming the argument that cannot be."""
         self.config = config = config or EnvConfig()
-        _check(config, render_mode, self.metadata["render_modes"])
+        check_config(config, render_mode, self.metadata["render_modes"])
         self.num_envs = num_envs
         self.render_mode = render_mode
         self._mode = AutoresetMode[config.autoreset.upper()]
@@ -367,14 +336,3 @@ def _residual_forces(character: Character, config: EnvConfig) -> ResidualForces 
     if config.residual_force == 0:
         return None
     return ResidualForces(character, config.residual_force, config.residual_reward)
-
-
-def _check(config: EnvConfig, render_mode: str | None, modes: list[str]) -> None:
-    for name, least in (("window", 1), ("episode_steps", 1), ("residual_force", 0), ("width", 1), ("height", 1)):
-        if getattr(config, name) < least:
-            raise SuiteError(f"{name}={getattr(config, name)}: needs at least {least}")
-    known = [mode.name.lower() for mode in AutoresetMode]
-    if config.autoreset not in known:
-        raise SuiteError(f"autoreset={config.autoreset}: no such mode; there are: {', '.join(known)}")
-    if render_mode is not None and render_mode not in modes:
-        raise SuiteError(f"render_mode={render_mode}: no such mode; there are: {', '.join(modes)}")

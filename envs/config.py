@@ -1,0 +1,60 @@
+"""What `gymnasium.make` takes beside the id."""
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from gymnasium.vector import AutoresetMode
+
+from murmillo.envs.errors import SuiteError
+from murmillo.envs.falls import FallConfig
+from murmillo.envs.starts import StartConfig
+
+
+@dataclass
+class EnvConfig:
+    """The settings of an environment.
+
+    Attributes:
+        motions: "builtin", a folder of clips or one file.
+        character: an MJCF of `assets/mjcf`.
+        window: frames of `state` that the observation `window` holds, the newest last; 1 leaves it out.
+        episode_steps: control steps until an episode is truncated (300 steps are 10 s).
+        residual_force: scale of the skeletal residual forces [N] (C.ASE section 3.1); 0 takes them out of the action.
+        residual_reward: form of their regularising reward (`ResidualForces.reward`), "sum" (paper) or "mean" (code).
+        autoreset: gymnasium's autoreset mode of the vector environment.
+        threads: CPU threads of the physics; 0 takes every CPU.
+        camera, width, height: of the frames of `render_mode="rgb_array"`.
+    """
+
+    motions: str = "builtin"
+    character: str = "sword_shield"
+    window: int = 1
+    episode_steps: int = 300
+    residual_force: float = 0.0
+    residual_reward: Literal["sum", "mean"] = "sum"
+    autoreset: Literal["same_step", "next_step", "disabled"] = "same_step"
+    threads: int = 0
+    camera: str = "track"
+    width: int = 640
+    height: int = 480
+    fall: FallConfig = field(default_factory=FallConfig)
+    starts: StartConfig = field(default_factory=StartConfig)
+
+
+def check_config(config: EnvConfig, render_mode: str | None, modes: list[str]) -> None:
+    """Refuse what cannot be.
+
+    Args:
+        modes: the render modes that there are.
+
+    Raises:
+        SuiteError: naming the setting, what was wrong and what would be right.
+    """
+    for name, least in (("window", 1), ("episode_steps", 1), ("residual_force", 0), ("width", 1), ("height", 1)):
+        if getattr(config, name) < least:
+            raise SuiteError(f"{name}={getattr(config, name)}: needs at least {least}")
+    known = [mode.name.lower() for mode in AutoresetMode]
+    if config.autoreset not in known:
+        raise SuiteError(f"autoreset={config.autoreset}: no such mode; there are: {', '.join(known)}")
+    if render_mode is not None and render_mode not in modes:
+        raise SuiteError(f"render_mode={render_mode}: no such mode; there are: {', '.join(modes)}")
