@@ -10,7 +10,7 @@ from murmillo.agents.calm.condition import LatentCondition
 from murmillo.agents.calm.config import CALMConfig
 from murmillo.agents.calm.encoder import MotionEncoder
 from murmillo.agents.calm.losses import alignment_loss, uniformity_loss
-from murmillo.agents.calm.motions import MotionSequence
+from murmillo.agents.calm.motions import MotionSequence, cut, select
 from murmillo.agents.common.dimensions import dimensions
 from murmillo.agents.common.discriminator import Discriminator, Windows, discriminator_loss, style_reward
 from murmillo.agents.common.interface import Demonstrations, Obs, Step
@@ -95,12 +95,13 @@ class CALM:
         windows, latents = rollout.flat("next_window"), rollout.flat("latent")
         masks = rollout.flat("mask") if "mask" in rollout else None
         k = config.discriminator.minibatch
+        pool = self._draw_motions(config.encoder.pool, config.encoder.frames + config.encoder.shift)
 
         for _ in range(config.discriminator.updates):
             rows = torch.randint(len(windows), (k,), generator=generator)
             agent = Windows(windows[rows], latents[rows], None if masks is None else masks[rows])
             replay = Windows(**self.replay.sample(k, generator)) if len(self.replay) else agent
-            demonstration = self._encoded_demonstration(k)
+            demonstration = self._encoded_demonstration(pool)
             negative = self._negative(demonstration)
             loss = discriminator_loss(self.discriminator, agent, replay, demonstration, negative)
             self.optimizer.zero_grad()
@@ -114,7 +115,7 @@ class CALM:
             generator,
             fields=("motion",),
             condition=self._encode_batch,
-            extra_loss=self._structure,
+            extra_loss=lambda batch, mean: self._structure(pool),
         )
         remembered = {"window": windows, "condition": latents}
         self.replay.add(remembered if masks is None else remembered | {"mask": masks}, generator)
@@ -128,15 +129,13 @@ class CALM:
         motions, row = batch["motion"].unique(return_inverse=True)
         return self.encoder(self.motions.of(motions))[row]
 
-    def _structure(self, batch: Minibatch, mean: Tensor) -> dict[str, Tensor]:
-        """Eqs. 5 and 6 on motions and their overlapping neighbours."""
+    def _structure(self, pool: Windows) -> dict[str, Tensor]:
+        """Eqs. 5 and 6 on motions of the pool and their overlapping neighbours."""
         config = self.config.encoder
-        longer = self._draw_motions(config.minibatch, config.frames + config.shift)
-        shift = torch.randint(config.shift + 1, (config.minibatch, 1), generator=self.generator)
-        frame = torch.arange(config.frames) + config.shift - shift
-        rows = torch.arange(config.minibatch)[:, None]
-        z = self.encoder(Windows(longer.window[:, config.shift :], mask=longer.mask))
-        overlapping = self.encoder(Windows(longer.window[rows, frame], mask=longer.mask))
+        motions = self._some(pool, config.minibatch)
+        shift = torch.randint(config.shift + 1, (config.minibatch,), generator=self.generator)
+        z = self.encoder(cut(motions, torch.full_like(shift, config.shift), config.frames))
+        overlapping = self.encoder(cut(motions, config.shift - shift, config.frames))
         return {
             "alignment": config.alignment_weight * alignment_loss(z, overlapping),
             "uniformity": config.uniformity_weight * uniformity_loss(z),
@@ -147,13 +146,16 @@ class CALM:
         return Windows(drawn["window"], mask=drawn.get("mask"))
 
     @torch.no_grad()
-    def _encoded_demonstration(self, n: int) -> Windows:
-        """A window out of each of n motions, with the motion's encoding."""
-        config = self.config
-        motion = self._draw_motions(n)
-        first = torch.randint(config.encoder.frames - config.window + 1, (n, 1), generator=self.generator)
-        window = motion.window[torch.arange(n)[:, None], first + torch.arange(config.window)]
-        return Windows(window, self.encoder(motion), motion.mask)
+    def _encoded_demonstration(self, pool: Windows) -> Windows:
+        """A minibatch of windows, each out of a motion of the pool, with the motion's encoding."""
+        config, n = self.config, self.config.discriminator.minibatch
+        motions = self._some(pool, n)
+        motions = motions._replace(window=motions.window[:, config.encoder.shift :])
+        first = torch.randint(config.encoder.frames - config.window + 1, (n,), generator=self.generator)
+        return cut(motions, first, config.window)._replace(condition=self.encoder(motions))
+
+    def _some(self, pool: Windows, n: int) -> Windows:
+        return select(pool, torch.randint(len(pool.window), (n,), generator=self.generator))
 
     def _negative(self, demonstration: Windows) -> Windows | None:
         """True windows with a latent that is not theirs."""

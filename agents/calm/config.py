@@ -21,6 +21,7 @@ class EncoderConfig:
         alignment_weight: of eq. 5.
         uniformity_weight: of eq. 6.
         minibatch: motions that the two are estimated on.
+        pool: motions that are drawn anew for every update; its minibatches of true motions come out of them.
     """
 
     frames: int = 60
@@ -30,6 +31,7 @@ class EncoderConfig:
     alignment_weight: float = 0.1
     uniformity_weight: float = 0.05
     minibatch: int = 4096
+    pool: int = 16384
 
 
 @dataclass
@@ -67,6 +69,9 @@ class CALMConfig:
                 f"agent.encoder.frames={encoder.frames}: the discriminator's windows lie inside the motion; "
                 f"needs at least agent.window={self.window}"
             )
+        needed = max(encoder.minibatch, self.discriminator.minibatch)
+        if encoder.pool < needed:
+            raise AgentError(f"agent.encoder.pool={encoder.pool}: minibatches come out of it; needs at least {needed}")
         if not 1 <= encoder.stride <= encoder.frames or encoder.shift < 0:
             raise AgentError(
                 f"agent.encoder: stride={encoder.stride} must be 1 to frames={encoder.frames}, and "

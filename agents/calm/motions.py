@@ -56,7 +56,7 @@ class MotionSequence:
 
     def of(self, numbers: Tensor) -> Windows:
         """The motions [n, F, D] of these numbers [n], which `encode_again` gives out anew."""
-        return Windows(self._window[numbers], mask=self.mask(numbers))
+        return select(Windows(self._window, mask=self._masks), numbers)
 
     def mask(self, numbers: Tensor) -> Tensor | None:
         """What these motions [n] leave out, [n, D] bool; None where no motion leaves anything out."""
@@ -90,3 +90,14 @@ class MotionSequence:
     def load_state_dict(self, state: dict[str, Any]) -> None:
         self._keep(Windows(state["window"].clone(), mask=state.get("mask")))
         self._latents.load_state_dict(state["latents"])
+
+
+def select(motions: Windows, rows: Tensor) -> Windows:
+    """These rows [n] of motions [M, F, D]."""
+    return Windows(motions.window[rows], mask=None if motions.mask is None else motions.mask[rows])
+
+
+def cut(motions: Windows, first: Tensor, frames: int) -> Windows:
+    """Of each motion [n, F, D] the frames [n, frames, D] from the `first` [n] on."""
+    rows = torch.arange(len(first))[:, None]
+    return motions._replace(window=motions.window[rows, first[:, None] + torch.arange(frames)])

@@ -11,6 +11,9 @@ from murmillo.agents.common.interface import ImitationPairs
 from murmillo.agents.common.ppo import ActorCritic
 from murmillo.agents.common.training import adam
 
+_CONDITIONS = 16
+"""Minibatches of conditions, drawn once: those of CALM are encodings of motions, and dear."""
+
 
 @dataclass
 class WarmStartConfig:
@@ -53,11 +56,12 @@ def warm_start(
     action = data["action"].float()
     model.state_normalizer.update(data["state"])
     state = model.state_normalizer(data["state"])
+    conditions = [condition(config.minibatch) for _ in range(_CONDITIONS)]
     optimizer = adam((model.policy.parameters(), config.learning_rate))
     losses: list[float] = []
-    for _ in range(config.steps):
+    for step in range(config.steps):
         rows = torch.randint(config.pairs, (config.minibatch,), generator=generator)
-        mean = model.policy(state[rows], condition(config.minibatch))
+        mean = model.policy(state[rows], conditions[step % _CONDITIONS])
         loss = F.mse_loss(mean, action[rows])
         optimizer.zero_grad()
         loss.backward()

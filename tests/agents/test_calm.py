@@ -34,7 +34,7 @@ def small_calm(**changes: Any) -> CALMConfig:
     discriminator = DiscriminatorConfig(
         hidden=(32, 32), learning_rate=1e-3, minibatch=64, updates=8, gradient_penalty=1.0, replay_size=1000
     )
-    encoder = EncoderConfig(frames=FRAMES, hidden=(32, 32), shift=2, minibatch=64)
+    encoder = EncoderConfig(frames=FRAMES, hidden=(32, 32), shift=2, minibatch=64, pool=256)
     fields = {
         "latent_dim": 4,
         "latent_steps": (4, 16),
@@ -81,7 +81,7 @@ def test_the_policy_follows_the_encoded_motion(tmp_path: Path) -> None:
 
 def test_encodings_have_unit_length_and_depend_on_every_frame_that_is_seen(generator: torch.Generator) -> None:
     env = PointMass(3)
-    encoder = EncoderConfig(frames=FRAMES, stride=2, hidden=(16,), shift=0, minibatch=8)
+    encoder = EncoderConfig(frames=FRAMES, stride=2, hidden=(16,), shift=0, minibatch=8, pool=64)
     calm = CALM(env, env.demonstrations, small_calm(encoder=encoder), generator)
     motion = torch.randn(5, FRAMES, 4, generator=generator)
     z = calm.encode(motion)
@@ -94,7 +94,7 @@ def test_encodings_have_unit_length_and_depend_on_every_frame_that_is_seen(gener
 
 def test_the_policys_loss_trains_the_encoder_and_the_discriminators_does_not(tmp_path: Path) -> None:
     plain = EncoderConfig(
-        frames=FRAMES, hidden=(16,), shift=0, alignment_weight=0.0, uniformity_weight=0.0, minibatch=8
+        frames=FRAMES, hidden=(16,), shift=0, alignment_weight=0.0, uniformity_weight=0.0, minibatch=8, pool=64
     )
     still = PPOConfig(hidden=(8,), style_hidden=(), policy_learning_rate=0.0, epochs=1, minibatch=64)
     moving = PPOConfig(hidden=(8,), style_hidden=(), policy_learning_rate=1e-3, epochs=1, minibatch=64)
@@ -205,6 +205,7 @@ def test_interpolation_stays_on_the_sphere_and_goes_evenly(generator: torch.Gene
         ({"negatives": "some"}, r"agent\.negatives=some is not one of sphere, shuffled, none"),
         ({"window": 70, "encoder": EncoderConfig()}, r"agent\.encoder\.frames=60: .* at least agent\.window=70"),
         ({"encoder": EncoderConfig(stride=0)}, r"stride=0 must be 1 to frames=60"),
+        ({"encoder": EncoderConfig(frames=6, pool=50)}, r"agent\.encoder\.pool=50: .* at least 4096"),
     ],
 )
 def test_impossible_settings_are_refused(changes: dict[str, Any], message: str) -> None:
