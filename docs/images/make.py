@@ -9,7 +9,7 @@ from murmillo.envs.character import load_character
 from murmillo.envs.motion import load_clips
 from murmillo.envs.rendering import FrameRenderer
 
-MOMENTS = {"guard": 0.2, "slash_down": 0.38, "shield_bash": 0.45, "kick": 0.5, "walk_forward": 0.45}
+MOMENTS = {"guard": 0.2, "slash_up": 0.33, "spin_attack": 0.36, "kick": 0.40, "jump": 0.46}
 """Clip and the part of it that has gone by."""
 
 character = load_character()
