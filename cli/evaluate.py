@@ -63,6 +63,7 @@ def measure_ages(config: "TrainConfig", folder: Path, worlds: int, seed: int = 1
 
     from murmillo.cli import runs
     from murmillo.cli.agents import load_player, make_agent
+    from murmillo.cli.encodings import concentration
     from murmillo.cli.rollouts import measure
     from murmillo.envs import HumanoidVectorEnv
 
@@ -76,7 +77,10 @@ def measure_ages(config: "TrainConfig", folder: Path, worlds: int, seed: int = 1
         if (folder / runs.WARM_STARTED).exists():
             players["warm_started"] = load_player(*made_of, folder / runs.WARM_STARTED)
         players["trained"] = load_player(*made_of, folder / runs.LAST)
-        return {age: measure(env, player, judge, seed).as_dict() for age, player in players.items()}
+        return {
+            age: measure(env, player, judge, seed).as_dict() | {"concentration": concentration(env, player)}
+            for age, player in players.items()
+        }
     finally:
         env.close()
 

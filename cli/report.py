@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from omegaconf import OmegaConf
 
-from murmillo.cli import obedience, runs
+from murmillo.cli import encodings, obedience, runs
 from murmillo.cli.evaluate import AGES
 from murmillo.cli.metrics import LABELS, TRAINING, Metric
 from murmillo.cli.plots import Scalars, plot_all
@@ -29,6 +29,7 @@ def write(folder: Path) -> Path:
         _notices(runs.read_json(folder / runs.NOTICES, [])),
         _ages(measures),
         obedience.section(measures, runs.read_json(folder / runs.SKILLS, {})),
+        encodings.section(measures),
     ]
     if len(scalars["samples"]):
         plots = plot_all(scalars, folder / runs.PLOTS)

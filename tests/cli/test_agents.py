@@ -31,6 +31,7 @@ def test_trains_resumes_and_is_measured(agent: str, murmillo: Murmillo, folder: 
     assert list(measures) == ["untrained", "warm_started", "trained"]
     assert AGENTS[agent].labelled == bool(measures["trained"]["heads"])
     assert AGENTS[agent].labelled == (folder / "runs/one/skills.json").exists()
+    assert (agent == "calm") == (measures["trained"]["concentration"] is not None)
 
 
 def test_residual_forces_reach_the_report(murmillo: Murmillo, folder: Path, tiny: tuple[str, ...]) -> None:

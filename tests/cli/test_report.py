@@ -53,6 +53,16 @@ def test_report_has_the_figures(run_folder: Path) -> None:
     assert "fall_rate.png" not in text
 
 
+def test_report_says_how_well_the_encoder_knows_the_clips(run_folder: Path) -> None:
+    assert "Fisher" not in report.write(run_folder).read_text()
+    measures = runs.read_json(run_folder / runs.MEASURES)
+    measures["untrained"] |= {"concentration": 0.632}
+    measures["trained"] |= {"concentration": 0.246}
+    runs.write_json(run_folder / runs.MEASURES, measures)
+    text = report.write(run_folder).read_text()
+    assert "| before training | 0.632 |\n| after training | 0.246 |" in text
+
+
 def test_report_says_whether_the_label_is_obeyed(run_folder: Path) -> None:
     assert "as it is told" not in report.write(run_folder).read_text()
     measures = runs.read_json(run_folder / runs.MEASURES)

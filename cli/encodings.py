@@ -1,0 +1,48 @@
+"""How well an agent that encodes motions has ordered its latents."""
+
+from typing import Any
+
+import torch
+
+from murmillo.cli.evaluate import AGES
+from murmillo.envs import HumanoidVectorEnv
+from murmillo.envs.metrics.latents import fisher_concentration
+
+_EVERY = 0.2
+"""[s] from one window of a clip to the next."""
+
+
+def concentration(env: HumanoidVectorEnv, agent: Any) -> float | None:
+    """Fisher concentration of the encodings of windows that slide over the clips; None for an agent without encoder."""
+    if not hasattr(agent, "encode"):
+        return None
+    library, frames = env.library, agent.encoder.frames
+    span = (frames - 1) * env.character.control_dt
+    latents, clips = [], []
+    for number, duration in enumerate(library.duration.tolist()):
+        times = torch.arange(min(span, duration), duration + 1e-6, _EVERY, dtype=torch.float64)
+        clip = torch.full((len(times),), number)
+        latents.append(agent.encode(library.window(clip, times, frames)))
+        clips.append(clip)
+    return fisher_concentration(torch.cat(latents), torch.cat(clips))
+
+
+def section(measures: dict[str, Any]) -> str:
+    """The report's section, Markdown; empty for an agent without encoder."""
+    known = {age: measured.get("concentration") for age, measured in measures.items()}
+    rows = [f"| {AGES[age]} | {value:.3f} |" for age, value in known.items() if value is not None]
+    if not rows:
+        return ""
+    return "\n".join(
+        [
+            "## Does the encoder know the clips apart?",
+            "",
+            "Fisher concentration (CALM, eq. 9): how far the encodings of a clip's windows lie from each other, over "
+            "how far they lie from those of all clips. Down is good: 1 means that clips do not matter. The table by minute "
+            "has the discriminator's score of the agent under its own latent and under another's.",
+            "",
+            "| policy | Fisher concentration |",
+            "|---|---:|",
+            *rows,
+        ]
+    )
