@@ -38,8 +38,8 @@ def section(measures: dict[str, Any]) -> str:
             "## Does the encoder know the clips apart?",
             "",
             "Fisher concentration (CALM, eq. 9): how far the encodings of a clip's windows lie from each other, over "
-            "how far they lie from those of all clips. Down is good: 1 means that clips do not matter. The table by minute "
-            "has the discriminator's score of the agent under its own latent and under another's.",
+            "how far they lie from those of all clips. Down is good: 1 means that clips do not matter. The table by "
+            "minute has the discriminator's score of the agent under its own latent and under another's.",
             "",
             "| policy | Fisher concentration |",
             "|---|---:|",
