@@ -9,6 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rich.console import Console
+from rich.markup import escape
+from rich.progress import track
 from rich.table import Table
 
 from murmillo.envs.character import load_character
@@ -41,10 +43,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def _make_pack(name: str, folder: Path, sheets: Path | None) -> None:
     character, clips = load_character(name), []
-    table = Table(title=UNITS)
+    table = Table(title=escape(UNITS), box=None)
     for column in (name, *COLUMNS):
-        table.add_column(column, justify="left" if column == name else "right")
-    for skill in PACKS[name]:
+        table.add_column(column, justify="left" if column == name else "right", no_wrap=True)
+    for skill in track(PACKS[name], name):
         clip = generate(skill(), character)
         clips.append(clip)
         table.add_row(*_row(clip, measure(clip, character)))
