@@ -152,6 +152,7 @@ def test_a_window_may_be_longer_than_its_clip(library):
 
 def test_mask_says_which_features_a_clip_made_up(make_clip, character):
     library = MotionLibrary([make_clip("one"), make_clip("two", masked=("shield",))], character)
+    assert library.mask is not None
     assert library.mask.sum(-1).tolist() == [0, 3]
     assert MotionLibrary([make_clip("one")], character).mask is None
 
