@@ -13,6 +13,7 @@ from murmillo.agents.common.runner import Runner
 from murmillo.cli.agents import make_agent
 from murmillo.cli.config import compose_train
 from murmillo.envs import EnvConfig, HumanoidVectorEnv
+from murmillo.envs.character import Character
 
 NOISE = 0.2
 """Half width of the uniform actions; the character falls within a second, as an untrained policy does."""
@@ -43,27 +44,27 @@ def noise(shape: tuple[int, ...], seed: int) -> np.ndarray:
     return np.random.default_rng(seed).uniform(-NOISE, NOISE, shape).astype(np.float32)
 
 
-def bare_steps_per_second(num_envs: int = 1024, steps: int = 24) -> float:
-    """Control steps a second of mj_step alone, one process a CPU, through the very states of the environment.
+class BareSimulation:
+    """mj_step alone, one process a CPU, through states that the environment visited.
 
     Contacts decide what a step costs, so that the bare simulation is put where the environment's worlds are, step by
     step; reading, writing and all else that an environment does is left out.
     """
-    env = make_env(num_envs)
-    visited = []
-    for step in range(steps):
-        action = noise((num_envs, 31), WARM_UP + step)
-        state = env.physics.state_dict()
-        targets = env.character.targets(torch.from_numpy(action).double())
-        visited.append([x.numpy() for x in (state["qpos"], state["qvel"], state["qacc_warmstart"], targets)])
-        env.step(action)
-    rows = [np.concatenate(field) for field in zip(*visited, strict=True)]
-    cpus = os.cpu_count() or 1
-    shares = [[field[cpu::cpus] for field in rows] for cpu in range(cpus)]
-    with mp.get_context("spawn").Pool(cpus) as pool:
-        model, substeps = env.character.model, env.character.substeps
-        rates = [pool.apply_async(_bare_rate, (model, substeps, *share)) for share in shares]
+
+    def __init__(self, character: Character) -> None:
+        self._cpus = os.cpu_count() or 1
+        self._model, self._substeps = character.model, character.substeps
+        self._pool = mp.get_context("spawn").Pool(self._cpus)
+
+    def rate(self, visited: list[list[np.ndarray]]) -> float:
+        """Control steps a second on all CPUs through these steps' (qpos, qvel, qacc_warmstart, ctrl), each [N, .]."""
+        rows = [np.concatenate(field) for field in zip(*visited, strict=True)]
+        shares = [[field[cpu :: self._cpus] for field in rows] for cpu in range(self._cpus)]
+        rates = [self._pool.apply_async(_bare_rate, (self._model, self._substeps, *share)) for share in shares]
         return sum(rate.get() for rate in rates)
+
+    def close(self) -> None:
+        self._pool.terminate()
 
 
 def _bare_rate(

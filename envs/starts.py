@@ -14,6 +14,9 @@ from murmillo.envs.physics import make_physics
 REFERENCE, DEFAULT, FALLEN, RECOVERY = range(4)
 KINDS = ("reference", "default", "fallen", "recovery")
 
+_MOST_AHEAD = 512
+_STOCKED = ("qpos", "qvel", "window")
+
 
 @dataclass
 class StartConfig:
@@ -45,25 +48,27 @@ class Starts:
     Attributes:
         kind: [n] REFERENCE, DEFAULT, FALLEN or RECOVERY.
         qpos: [n, nq]; qvel: [n, nv].
-        clip, time: [n], [n] [s] of reference starts.
+        window: [r, W, D] the states of the clips up to the r reference starts.
     """
 
     kind: Tensor
     qpos: Tensor
     qvel: Tensor
-    clip: Tensor
-    time: Tensor
+    window: Tensor
 
 
 class StartSampler:
-    """Draws starts by the shares of `StartConfig`."""
+    """Draws starts by the shares of `StartConfig`; reference starts come with a window of `window` states."""
 
-    def __init__(self, character: Character, library: MotionLibrary, config: StartConfig, num_envs: int) -> None:
+    def __init__(
+        self, character: Character, library: MotionLibrary, config: StartConfig, num_envs: int, window: int
+    ) -> None:
         for name in ("recovery", "fallen", "reference"):
             if not 0.0 <= getattr(config, name) <= 1.0:
                 raise SuiteError(f"starts.{name}={getattr(config, name)}: needs a share between 0 and 1")
         self.config = config
-        self._character, self._library = character, library
+        self._character = character
+        self._references = _ReferenceStock(character, library, min(num_envs, _MOST_AHEAD), window)
         self._pool_size = min(config.fallen_states, max(16, num_envs))
         self._pool: Tensor | None = None
         self.on_ground = True
@@ -81,23 +86,26 @@ class StartSampler:
             kinds = torch.where(fell & (chance[2] < config.recovery), RECOVERY, kinds)
         if kind is not None:
             kinds.fill_(kind)
-        clip, time = self._library.sample(n, generator)
         qpos = self._default.repeat(n, 1)
         qvel = torch.zeros(n, self._character.model.nv, dtype=torch.float64)
         moving = (kinds == REFERENCE).nonzero().squeeze(-1)
-        if len(moving):
-            qpos[moving], qvel[moving] = self._reference(clip[moving], time[moving])
+        qpos[moving], qvel[moving], window = self._references.take(len(moving), generator)
         fallen = (kinds == FALLEN).nonzero().squeeze(-1)
         if len(fallen):
             pool = self._fallen_states()
             qpos[fallen] = pool[torch.randint(len(pool), (len(fallen),), generator=generator)]
-        return Starts(kinds, qpos, qvel, clip, time)
+        return Starts(kinds, qpos, qvel, window)
 
-    def _reference(self, clip: Tensor, time: Tensor) -> tuple[Tensor, Tensor]:
-        """Poses and velocities of the clips, lifted out of the floor, which would throw them into the air."""
-        qpos, qvel = self._library.pose(clip, time)
-        qpos[:, 2] += (-lowest_point(self._character, qpos)).clamp_min(0.0)
-        return qpos.double(), qvel.double()
+    def forget(self) -> None:
+        """Throw away what was drawn ahead, as a new seed asks."""
+        self._references.stock = None
+
+    def state_dict(self) -> dict[str, Tensor]:
+        """What was drawn ahead."""
+        return dict(zip(_STOCKED, self._references.stock or (), strict=False))
+
+    def load_state_dict(self, state: dict[str, Tensor]) -> None:
+        self._references.stock = tuple(state[name].clone() for name in _STOCKED) if state else None
 
     def _fallen_states(self) -> Tensor:
         """[P, nq] poses of characters that were dropped 2.5 s ago, turned at random, with a random constant action.
@@ -119,3 +127,29 @@ class StartSampler:
                 physics.step(target)
             self._pool = physics.state.qpos.clone()
         return self._pool
+
+
+class _ReferenceStock:
+    """Reference starts, made many at a time: a hundred cost little more than one."""
+
+    def __init__(self, character: Character, library: MotionLibrary, batch: int, window: int) -> None:
+        self._character, self._library, self._batch, self._window = character, library, batch, window
+        self.stock: tuple[Tensor, ...] | None = None
+        """What is left of qpos [m, nq], qvel [m, nv] and window [m, W, D]."""
+
+    def take(self, n: int, generator: torch.Generator) -> tuple[Tensor, ...]:
+        """qpos [n, nq], qvel [n, nv] and window [n, W, D] of n starts."""
+        left = 0 if self.stock is None else len(self.stock[0])
+        if self.stock is None or left < n:
+            made = self._make(max(self._batch, n - left), generator)
+            self.stock = made if self.stock is None else tuple(map(torch.cat, zip(self.stock, made, strict=True)))
+        taken = tuple(field[:n] for field in self.stock)
+        self.stock = tuple(field[n:] for field in self.stock)
+        return taken
+
+    def _make(self, n: int, generator: torch.Generator) -> tuple[Tensor, ...]:
+        clip, time = self._library.sample(n, generator)
+        qpos, qvel = self._library.pose(clip, time)
+        # lifted out of the floor, which would throw them into the air
+        qpos[:, 2] += (-lowest_point(self._character, qpos)).clamp_min(0.0)
+        return qpos.double(), qvel.double(), self._library.window(clip, time, self._window)

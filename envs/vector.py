@@ -76,7 +76,7 @@ class HumanoidVectorEnv(VectorEnv):
         self.physics = make_physics(self.character, num_envs, threads=config.threads)
         self.task = task or Imitation()
         self._fallen = FallDetector(self.character, config.fall)
-        self._starts = StartSampler(self.character, self.library, config.starts, num_envs)
+        self._starts = StartSampler(self.character, self.library, config.starts, num_envs, config.window)
         self._residual = _residual_forces(self.character, config)
         self._set_spaces()
         self._generator = torch.Generator()
@@ -117,6 +117,7 @@ class HumanoidVectorEnv(VectorEnv):
             self._generator.manual_seed(int(words[0]) << 31 ^ int(words[1]))
             self._np_random, self._np_random_seed = seeding.np_random(int(words[0]))
             self._fell.fill_(False)
+            self._starts.forget()
         options = options or {}
         start = options.get("start")
         if start is not None and start not in KINDS[:RECOVERY]:
@@ -241,12 +242,14 @@ class HumanoidVectorEnv(VectorEnv):
 
     def state_dict(self) -> dict[str, Any]:
         """All that the next step depends on."""
+        parts = {"physics": self.physics.state_dict(), "starts": self._starts.state_dict()}
         own = {name: getattr(self, f"_{name}").clone() for name in _OWN_STATE}
-        return {"physics": self.physics.state_dict(), "generator": self._generator.get_state(), **own}
+        return {**parts, "generator": self._generator.get_state(), **own}
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Continue from `state_dict`, bit for bit."""
         self.physics.load_state_dict(state["physics"])
+        self._starts.load_state_dict(state["starts"])
         self._generator.set_state(state["generator"])
         for name in _OWN_STATE:
             setattr(self, f"_{name}", state[name].clone())
@@ -306,10 +309,7 @@ class HumanoidVectorEnv(VectorEnv):
         self.physics.write(ids[moved], starts.qpos[moved], starts.qvel[moved])
         history = self._history.clone()
         history[ids[moved]] = self._frame(ids[moved]).unsqueeze(1)
-        past = (starts.kind == REFERENCE).nonzero().squeeze(-1)
-        if self.config.window > 1 and len(past):
-            window = self.library.window(starts.clip[past], starts.time[past], self.config.window)
-            history[ids[past], :-1] = window[:, :-1]
+        history[ids[starts.kind == REFERENCE], :-1] = starts.window[:, :-1]
         self._history = history
         free = (starts.kind == RECOVERY) | (starts.kind == FALLEN)
         self._steps[ids] = 0
