@@ -1,7 +1,6 @@
 """The character as its MJCF has it: names, layouts, action targets, kinematics. Nothing of it is written elsewhere."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
 from importlib.resources import files
 from typing import Literal
@@ -12,7 +11,8 @@ import torch
 from torch import Tensor
 
 from murmillo.envs.errors import SuiteError
-from murmillo.envs.rotations import quat_from_rotvec, quat_mul, quat_rotate, quat_to_rotvec
+from murmillo.envs.kinematics import BodyTree, Joint
+from murmillo.envs.rotations import quat_from_rotvec, quat_to_rotvec
 
 CONTROL_DT = 1.0 / 30.0
 """Seconds between two actions: the papers' 30 Hz."""
@@ -23,26 +23,6 @@ _VISUAL_GROUP = 2  # geoms that are seen but touch nothing
 _BOX = 6  # bounds of a ball joint's exponential map
 
 SpecEdit = Callable[[mujoco.MjSpec], None]
-
-
-@dataclass(frozen=True)
-class Joint:
-    """A joint and where it lies in qpos, in qvel and in the action."""
-
-    name: str
-    kind: Literal["ball", "hinge"]
-    qpos: slice
-    dof: slice
-    action: slice
-
-
-@dataclass(frozen=True)
-class _Level:
-    """Bodies at one depth of the tree, their parents, and their offsets [n, 3] [m] there."""
-
-    bodies: list[int]
-    parents: list[int]
-    offsets: Tensor
 
 
 class Character:
@@ -76,6 +56,7 @@ class Character:
         _refuse_offsets(name, model)
         self.bodies = tuple(model.body(i).name for i in range(1, model.nbody))
         self.joints = tuple(_joints(name, model))
+        self._tree = BodyTree(model, self.joints)
         keys = [model.site(i).name for i in range(model.nsite) if model.site(i).name.startswith(_KEY)]
         self.key_bodies = tuple(
             sorted((key.removeprefix(_KEY) for key in keys), key=lambda body: _KEY_ORDER.index(body))
@@ -129,56 +110,7 @@ class Character:
 
     def forward_kinematics(self, qpos: Tensor) -> tuple[Tensor, Tensor]:
         """Body frames in the world of the pose qpos [..., nq]: positions [..., B, 3] [m], quaternions [..., B, 4]."""
-        pos = qpos.new_empty(*qpos.shape[:-1], len(self.bodies), 3)
-        quat = self._local_rotations(qpos)
-        pos[..., 0, :] = qpos[..., 0:3]
-        for level in self._levels:
-            parent = quat[..., level.parents, :]
-            pos[..., level.bodies, :] = pos[..., level.parents, :] + quat_rotate(parent, level.offsets.to(qpos))
-            quat[..., level.bodies, :] = quat_mul(parent, quat[..., level.bodies, :])
-        return pos, quat
-
-    def _local_rotations(self, qpos: Tensor) -> Tensor:
-        """Rotation of each body in its parent [..., B, 4]; the root's is in the world."""
-        quat = qpos.new_zeros(*qpos.shape[:-1], len(self.bodies), 4)
-        quat[..., 0] = 1.0
-        quat[..., 0, :] = qpos[..., 3:7]
-        bodies, columns = self._balls
-        quat[..., bodies, :] = qpos[..., columns]
-        bodies, columns, axes = self._hinges
-        half = 0.5 * qpos[..., columns]
-        quat[..., bodies, 0] = half.cos()
-        quat[..., bodies, 1:] = half.sin().unsqueeze(-1) * axes.to(qpos)
-        return quat
-
-    @cached_property
-    def _levels(self) -> list["_Level"]:
-        """The bodies after the root by their depth in the tree: those of a level are moved together."""
-        parents = self.model.body_parentid[1:] - 1
-        offsets = torch.from_numpy(self.model.body_pos[1:].copy())
-        levels, placed = [], [0]
-        while len(placed) < len(parents):
-            bodies = [body for body in range(1, len(parents)) if body not in placed and parents[body] in placed]
-            levels.append(_Level(bodies, parents[bodies].tolist(), offsets[bodies]))
-            placed += bodies
-        return levels
-
-    @cached_property
-    def _balls(self) -> tuple[list[int], Tensor]:
-        """Bodies on ball joints, and the columns [n, 4] of their quaternions in qpos."""
-        joints = [joint for joint in self.joints if joint.kind == "ball"]
-        return [self._child(joint) for joint in joints], torch.stack([_columns(joint.qpos) for joint in joints])
-
-    @cached_property
-    def _hinges(self) -> tuple[list[int], list[int], Tensor]:
-        """Bodies on hinges, the columns [n] of their angles in qpos, and the axes [n, 3]."""
-        joints = [joint for joint in self.joints if joint.kind == "hinge"]
-        axes = torch.stack([torch.from_numpy(self.model.joint(joint.name).axis.copy()) for joint in joints])
-        return [self._child(joint) for joint in joints], [joint.qpos.start for joint in joints], axes
-
-    def _child(self, joint: Joint) -> int:
-        """Position in `bodies` of the body that the joint moves."""
-        return int(self.model.joint(joint.name).bodyid[0]) - 1
+        return self._tree(qpos)
 
     def key_positions(self, qpos: Tensor) -> Tensor:
         """Key points [..., K, 3] [m] of the pose qpos [..., nq]; they lie at their bodies' origins."""
@@ -267,7 +199,3 @@ def _contact_slice(name: str, model: mujoco.MjModel, bodies: tuple[str, ...]) ->
         raise SuiteError(f"{name}.xml: needs one contact sensor {_GROUND}<body> a body, in the bodies' order")
     start = int(sensors[0].adr[0])
     return slice(start, start + 3 * len(bodies))
-
-
-def _columns(where: slice) -> Tensor:
-    return torch.arange(where.start, where.stop)

@@ -1,5 +1,7 @@
 """Rotations as torch functions. Quaternions [..., 4] are wxyz and of unit norm; leading shapes broadcast."""
 
+from collections.abc import Sequence
+
 import torch
 from torch import Tensor
 
@@ -93,4 +95,38 @@ def tan_norm(q: Tensor) -> Tensor:
             1.0 - 2.0 * (x * x + y * y),
         ),
         dim=-1,
+    )
+
+
+Components = tuple[Tensor, ...]
+"""A quaternion (w, x, y, z) or a vector (x, y, z) as tensors of one shape each: many small sums run faster on these."""
+
+
+def components_mul(a: Components, b: Components) -> Components:
+    """`quat_mul` of components."""
+    aw, ax, ay, az = a
+    bw, bx, by, bz = b
+    return (
+        (aw * bw).addcmul_(ax, bx, value=-1).addcmul_(ay, by, value=-1).addcmul_(az, bz, value=-1),
+        (aw * bx).addcmul_(ax, bw).addcmul_(ay, bz).addcmul_(az, by, value=-1),
+        (aw * by).addcmul_(ax, bz, value=-1).addcmul_(ay, bw).addcmul_(az, bx),
+        (aw * bz).addcmul_(ax, by).addcmul_(ay, bx, value=-1).addcmul_(az, bw),
+    )
+
+
+def components_rotate(q: Components, v: Components) -> Components:
+    """`quat_rotate` of components."""
+    w, *xyz = q
+    t = components_cross(xyz, [2.0 * x for x in v])
+    return tuple(x + u.addcmul_(w, s) for x, u, s in zip(v, components_cross(xyz, t), t, strict=True))
+
+
+def components_cross(a: Sequence[Tensor], b: Sequence[Tensor]) -> Components:
+    """The cross product of components."""
+    ax, ay, az = a
+    bx, by, bz = b
+    return (
+        (ay * bz).addcmul_(az, by, value=-1),
+        (az * bx).addcmul_(ax, bz, value=-1),
+        (ax * by).addcmul_(ay, bx, value=-1),
     )

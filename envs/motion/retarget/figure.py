@@ -6,7 +6,8 @@ import numpy as np
 import torch
 from scipy.spatial.transform import Rotation
 
-from murmillo.envs.character import Character, Joint
+from murmillo.envs.character import Character
+from murmillo.envs.kinematics import Joint
 from murmillo.envs.motion.retarget.bases import Floats
 from murmillo.envs.motion.retarget.skeleton_map import SIDES
 
