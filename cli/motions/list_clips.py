@@ -42,5 +42,5 @@ def run(words: list[str]) -> int:
     tables.show(columns, rows, left=("clip", "label", "loop", "masked", "licence", "redistributable", "source"))
     labels = len({clip.label for clip in found})
     print(f"{len(found)} clips of {labels} labels for {character.name}, {sum(clip.duration for clip in found):.1f} s")
-    print(f"{terms_of(found)}")
+    print(terms_of(found))
     return 0

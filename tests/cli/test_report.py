@@ -87,6 +87,19 @@ def test_report_says_why_there_is_no_video(run_folder: Path) -> None:
     assert "(video.mp4)" in report.write(run_folder).read_text()
 
 
+def test_report_says_how_to_go_on(run_folder: Path) -> None:
+    text = report.write(run_folder).read_text()
+    assert f"murmillo train run.resume={run_folder} runner.max_minutes=60 runner.samples=20000000\n" in text
+    assert "murmillo train agent=ase budget=laptop\n" in text
+    config = OmegaConf.load(run_folder / runs.CONFIG)
+    config.choices.agent, config.motions = "case", "my clips"
+    OmegaConf.save(config, run_folder / runs.CONFIG)
+    assert "murmillo train agent=case budget=laptop 'motions=my clips'\n" in report.write(run_folder).read_text()
+    config.choices.budget = "laptop"
+    OmegaConf.save(config, run_folder / runs.CONFIG)
+    assert "budget=laptop" not in report.write(run_folder).read_text()
+
+
 def test_report_of_a_run_without_an_iteration(run_folder: Path) -> None:
     (run_folder / runs.SCALARS).unlink()
     assert "0 samples" in report.write(run_folder).read_text()

@@ -99,6 +99,7 @@ def test_mirroring_twice_gives_the_clip_back_but_for_the_wrist() -> None:
         ("turn_left_90", "turn_right_90"),
         ("WalkRight01", "WalkLeft01"),
         ("kick", "kick_mirrored"),
+        ("upright", "upright_mirrored"),
     ],
 )
 def test_names_change_sides(name: str, mirrored: str) -> None:
