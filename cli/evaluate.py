@@ -89,8 +89,7 @@ def measure_ages(config: "TrainConfig", folder: Path, worlds: int, seed: int = 1
 
 def _print(ages: dict[str, dict[str, Any]]) -> None:
     """A row for each age; a column that no age has a figure for is left out."""
-    from rich.console import Console
-    from rich.table import Table
+    from murmillo.cli import tables
 
     columns = {
         "policy": [AGES[age] for age in ages],
@@ -104,12 +103,7 @@ def _print(ages: dict[str, dict[str, Any]]) -> None:
         "steps": [f"{m['steps']}" for m in ages.values()],
     }
     columns = {title: cells for title, cells in columns.items() if any(cells)}
-    table = Table(box=None, pad_edge=False)
-    for title in columns:
-        table.add_column(title, justify="left" if title == "policy" else "right")
-    for row in zip(*columns.values(), strict=True):
-        table.add_row(*row)
-    Console(soft_wrap=True, highlight=False).print(table)
+    tables.show(tuple(columns), list(zip(*columns.values(), strict=True)), left=("policy",))
 
 
 def _figure(value: float | None) -> str:

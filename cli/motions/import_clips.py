@@ -177,7 +177,8 @@ def _merged(kept: "Sequence[Clip]", new: "Sequence[Clip]") -> "list[Clip]":
 
 
 def _show(made: "Sequence[Made]") -> None:
-    from murmillo.cli.motions import import_table, tables
+    from murmillo.cli import tables
+    from murmillo.cli.motions import import_table
 
     tables.show(import_table.COLUMNS, import_table.rows(made), import_table.LEFT)
     for name, text in import_table.common_findings(made).items():

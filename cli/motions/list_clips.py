@@ -19,7 +19,8 @@ def run(words: list[str]) -> int:
     parser.add_argument("path")
     parser.add_argument("--character")
     options = parser.parse(words)
-    from murmillo.cli.motions import clips, tables
+    from murmillo.cli import tables
+    from murmillo.cli.motions import clips
     from murmillo.envs.motion.licences import terms_of
 
     found, character = clips.load(options.path, options.character)

@@ -135,6 +135,17 @@ def test_from_the_shell(folder: Path) -> None:
     assert done.stderr == "murmillo: sed: there is no such setting; did you mean seed?\n"
 
 
+def test_a_reader_that_has_read_enough(folder: Path) -> None:
+    """As `| head -1`: no traceback."""
+    command = [sys.executable, "-m", "murmillo.cli.main", "motions", "list", "builtin"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=folder) as process:
+        assert process.stdout is not None
+        process.stdout.close()
+        assert process.stderr is not None
+        assert process.stderr.read() == ""
+    assert process.returncode in (1, 141)  # 1 is what rich makes of it while it draws a table
+
+
 @pytest.mark.parametrize("words", [(), ("--help",), ("train", "--help"), ("evaluate", "-h"), ("record", "--help")])
 def test_help(murmillo: Murmillo, words: tuple[str, ...]) -> None:
     status, out, err = murmillo(*words)

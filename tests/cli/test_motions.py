@@ -119,6 +119,13 @@ def test_mirrored_again_every_image_has_a_name(murmillo: Murmillo, pair: str) ->
     ]
 
 
+def test_clips_are_told_apart_whatever_the_case_of_letters(builtin: dict[str, Clip]) -> None:
+    from murmillo.cli.motions.clips import told_apart
+
+    new = [replace(builtin["guard"], name=name) for name in ("Walk", "run", "Run", "run_2")]
+    assert [clip.name for clip in told_apart(new, ["walk"])] == ["Walk_2", "run", "Run_2", "run_2_2"]
+
+
 def test_label_by_name_and_by_file(murmillo: Murmillo, pair: str, folder: Path) -> None:
     assert murmillo("motions", "label", pair, "--by", "from-name", "--rule", "content", "--to", "a").status == 0
     assert {name: clip.label for name, clip in loaded("a").items()} == {"guard": "guard", "turn_left_90": "turn"}
