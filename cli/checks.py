@@ -1,12 +1,34 @@
 """Combinations of settings that cannot be, refused before anything is made."""
 
+import dataclasses
 from collections.abc import Iterator
+from operator import attrgetter
 from typing import Any
 
 from murmillo.cli.config import TrainConfig
 from murmillo.cli.errors import CommandError
+from murmillo.cli.seeds import check_seed
 from murmillo.envs.character import CONTROL_DT, load_character
 from murmillo.envs.motion import load_clips
+
+_LEAST = {
+    1: (
+        "num_envs",
+        "runner.horizon",
+        "runner.samples",
+        "agent.window",
+        "agent.latent_dim",
+        "agent.ppo.minibatch",
+        "agent.ppo.epochs",
+        "agent.discriminator.minibatch",
+        "agent.discriminator.updates",
+        "warm_start.pairs",
+        "warm_start.minibatch",
+        "run.measured_worlds",
+    ),
+    0: ("runner.max_minutes", "runner.checkpoint_minutes", "warm_start.steps"),
+}
+"""The least that these settings may be."""
 
 
 def check_settings(config: TrainConfig) -> None:
@@ -15,17 +37,18 @@ def check_settings(config: TrainConfig) -> None:
     Raises:
         CommandError: naming the key, what was wrong and what would be right.
     """
-    for name, value in (
-        ("num_envs", config.num_envs),
-        ("runner.horizon", config.runner.horizon),
-        ("runner.samples", config.runner.samples),
-        ("agent.window", config.agent.window),
-        ("agent.ppo.minibatch", config.agent.ppo.minibatch),
-        ("agent.discriminator.minibatch", config.agent.discriminator.minibatch),
-        ("run.measured_worlds", config.run.measured_worlds),
-    ):
-        if value < 1:
-            raise CommandError(f"{name}={value}: needs at least 1")
+    for least, names in _LEAST.items():
+        for name in names:
+            value = attrgetter(name)(config)
+            if value is not None and not value >= least:  # so written, a NaN is refused too
+                raise CommandError(f"{name}={value}: needs at least {least}")
+    for name in ("runner.gamma", "runner.lam"):
+        if not 0.0 <= (value := attrgetter(name)(config)) <= 1.0:
+            raise CommandError(f"{name}={value}: needs a number from 0 to 1")
+    for name, widths in _hidden("agent", config.agent):
+        if any(width < 1 for width in widths) or not (widths or name.endswith("style_hidden")):
+            raise CommandError(f"{name}=[{','.join(map(str, widths))}]: needs a width of at least 1 for each layer")
+    check_seed("seed", config.seed)
     if config.threads < 0:
         raise CommandError(f"threads={config.threads}: needs a number of threads, or 0 for every core")
     batch = config.num_envs * config.runner.horizon
@@ -71,6 +94,16 @@ def check_clips(config: TrainConfig) -> None:
             f"skills={config.skills}: the clips of motions={config.env.motions} have {len(labels)} labels "
             f"({', '.join(labels[:8])}{', …' if len(labels) > 8 else ''}); set skills={len(labels)} or null"
         )
+
+
+def _hidden(name: str, config: Any) -> Iterator[tuple[str, tuple[int, ...]]]:
+    """The widths of all hidden layers in an agent's configuration, by the name of their setting."""
+    for field in dataclasses.fields(config):
+        value, dotted = getattr(config, field.name), f"{name}.{field.name}"
+        if dataclasses.is_dataclass(value):
+            yield from _hidden(dotted, value)
+        elif field.name.endswith("hidden"):
+            yield dotted, value
 
 
 def _windows(agent: Any) -> Iterator[tuple[str, int]]:

@@ -19,7 +19,7 @@ from murmillo.cli import runs
 from murmillo.cli.agents import AGENTS
 from murmillo.cli.errors import CommandError
 from murmillo.cli.schema import build, schema_of
-from murmillo.cli.translate import command_error, wrong_name
+from murmillo.cli.translate import command_error, unreadable, wrong_name
 from murmillo.envs import EnvConfig
 
 GROUPS = ("agent", "budget", "ablation")
@@ -121,8 +121,10 @@ def load(folder: Path, words: list[str] | None = None) -> TrainConfig:
     """
     try:
         saved = OmegaConf.load(folder / runs.CONFIG)
-        choices = saved.pop("choices", {})  # type: ignore[union-attr]
-        composed, _ = _compose([f"agent={choices.get('agent', 'ase')}"])
+        choices = saved.pop("choices") if isinstance(saved, DictConfig) and "choices" in saved else None
+        if not isinstance(choices, DictConfig) or choices.get("agent") not in AGENTS:
+            raise CommandError(f"choices.agent: is none of {', '.join(AGENTS)}; copy the file of the run anew")
+        composed, _ = _compose([f"agent={choices.agent}"])
         return typed(_merge(composed, saved, words or []), choices)
     except CommandError as error:
         raise CommandError(f"{folder / runs.CONFIG}: {error}") from None
@@ -146,10 +148,14 @@ def parse(cls: type[T], words: list[str]) -> T:
         if name not in names:
             raise wrong_name(name, names)
     values = _merge(known, OmegaConf.create(), words)
-    missing = sorted(OmegaConf.missing_keys(values))
+    try:
+        missing = sorted(OmegaConf.missing_keys(values))
+        plain: Any = OmegaConf.to_container(values, resolve=True, enum_to_str=True)
+    except OmegaConfBaseException as error:
+        raise command_error(error, known) from None
     if missing:
         raise CommandError(f"{missing[0]}: this setting is needed; write {missing[0]}=…")
-    return build(cls, OmegaConf.to_container(values, enum_to_str=True))  # type: ignore[arg-type]
+    return build(cls, plain)
 
 
 def _compose(words: list[str]) -> tuple[DictConfig, Mapping[str, Any]]:
@@ -182,11 +188,20 @@ def _compose_resumed(path: str, words: list[str]) -> TrainConfig:
 def _merge(known: DictConfig, saved: Any, words: list[str]) -> DictConfig:
     OmegaConf.set_struct(known, None)  # hydra locks dicts too, where new names are fine
     try:
-        merged = OmegaConf.merge(known, saved, OmegaConf.from_dotlist(words))
+        merged = OmegaConf.merge(known, saved, _dotlist(words))
     except OmegaConfBaseException as error:
         raise command_error(error, known) from None
     assert isinstance(merged, DictConfig)
     return merged
+
+
+def _dotlist(words: list[str]) -> DictConfig:
+    for word in words:
+        try:
+            OmegaConf.from_dotlist([word])
+        except YAMLError:
+            raise unreadable(word) from None
+    return OmegaConf.from_dotlist(words)
 
 
 def _check_words(words: list[str]) -> None:

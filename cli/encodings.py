@@ -1,5 +1,6 @@
 """How well an agent that encodes motions has ordered its latents."""
 
+import math
 from typing import Any
 
 import torch
@@ -13,7 +14,10 @@ _EVERY = 0.2
 
 
 def concentration(env: HumanoidVectorEnv, agent: Any) -> float | None:
-    """Fisher concentration of the encodings of windows that slide over the clips; None for an agent without encoder."""
+    """Fisher concentration of the encodings of windows that slide over the clips.
+
+    None for an agent without encoder, and where no clip is long enough for two windows.
+    """
     if not hasattr(agent, "encode"):
         return None
     library, frames = env.library, agent.encoder.frames
@@ -22,9 +26,11 @@ def concentration(env: HumanoidVectorEnv, agent: Any) -> float | None:
     for number, duration in enumerate(library.duration.tolist()):
         times = torch.arange(min(span, duration), duration + 1e-6, _EVERY, dtype=torch.float64)
         clip = torch.full((len(times),), number)
-        latents.append(agent.encode(library.window(clip, times, frames)))
+        mask = None if library.mask is None else library.mask[clip]
+        latents.append(agent.encode(library.window(clip, times, frames), mask))
         clips.append(clip)
-    return fisher_concentration(torch.cat(latents), torch.cat(clips))
+    found = fisher_concentration(torch.cat(latents), torch.cat(clips))
+    return found if math.isfinite(found) else None
 
 
 def section(measures: dict[str, Any]) -> str:

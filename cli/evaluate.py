@@ -37,10 +37,12 @@ def run(words: list[str]) -> int:
     """Measure, print a table and write `evaluation.json`."""
     from murmillo.cli import config as configuration
     from murmillo.cli import runs
+    from murmillo.cli.seeds import check_seed
 
     settings = configuration.parse(EvaluateConfig, words)
     if settings.worlds < 1:
         raise CommandError(f"worlds={settings.worlds}: needs at least 1")
+    check_seed("seed", settings.seed)
     folder = runs.existing(settings.run, "run")
     config = configuration.load(folder)
     config.env.motions = settings.motions or config.env.motions
@@ -86,19 +88,23 @@ def measure_ages(config: "TrainConfig", folder: Path, worlds: int, seed: int = 1
 
 
 def _print(ages: dict[str, dict[str, Any]]) -> None:
-    from rich.console import Console
-    from rich.table import Table
+    """A row for each age; a column that no age has a figure for is left out."""
+    from murmillo.cli import tables
 
-    table = Table(box=None, pad_edge=False)
-    for title in ("policy", "episode length [steps]", "fall rate", "style score", "episodes", "steps"):
-        table.add_column(title, justify="left" if title == "policy" else "right")
-    for age, m in ages.items():
-        figures = (
-            f"{m['length']:.1f}",
-            f"{m['fall_rate']:.2f}",
-            f"{m['score']:.3f}",
-            f"{m['episodes']}",
-            f"{m['steps']}",
-        )
-        table.add_row(AGES[age], *figures)
-    Console(soft_wrap=True, highlight=False).print(table)
+    columns = {
+        "policy": [AGES[age] for age in ages],
+        "episode length [steps]": [f"{m['length']:.1f}" for m in ages.values()],
+        "fall rate": [f"{m['fall_rate']:.2f}" for m in ages.values()],
+        "style score": [f"{m['score']:.3f}" for m in ages.values()],
+        "commanded skill's head": [_figure(m["heads"].get("right")) for m in ages.values()],
+        "other heads": [_figure(m["heads"].get("other")) for m in ages.values()],
+        "Fisher concentration": [_figure(m["concentration"]) for m in ages.values()],
+        "episodes": [f"{m['episodes']}" for m in ages.values()],
+        "steps": [f"{m['steps']}" for m in ages.values()],
+    }
+    columns = {title: cells for title, cells in columns.items() if any(cells)}
+    tables.show(tuple(columns), list(zip(*columns.values(), strict=True)), left=("policy",))
+
+
+def _figure(value: float | None) -> str:
+    return "" if value is None else f"{value:.3f}"

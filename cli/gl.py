@@ -60,12 +60,9 @@ def choose() -> str | None:
     return None
 
 
-NO_GL = (
-    "no OpenGL draws here without a screen (tried {}): on Debian or Ubuntu `apt-get install libegl1 libosmesa6` "
-    "brings one; `murmillo doctor` tries them again"
-)
-
-
-def no_gl_message() -> str:
-    """The one line for a machine that cannot draw."""
-    return NO_GL.format(", ".join(BACKENDS.get(platform.system(), ())) or "none known for this system")
+def no_gl_message(tried: tuple[str, ...]) -> str:
+    """The one line for a machine that cannot draw by any of the back ends `tried`, the `candidates` before `choose`."""
+    return (
+        f"no OpenGL draws here without a screen (tried {', '.join(tried) or 'none, as none is known here'}): "
+        "on Debian or Ubuntu `apt-get install libegl1 libosmesa6` brings one; `murmillo doctor` tries them again"
+    )

@@ -1,6 +1,7 @@
 """The command `murmillo`: chooses the subcommand and turns a user's mistake into one line and exit status 2."""
 
 import importlib
+import os
 import sys
 
 from murmillo.cli.errors import CommandError, near_names, user_errors
@@ -21,16 +22,24 @@ COMMANDS = ("train", "evaluate", "record", "motions", "doctor")
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Run one command and return its exit status: 0 done, 2 for a mistake that the user can mend, 130 broken off."""
+    """Run one command and return its exit status: 0 done, 2 for a mistake that the user can mend, 130 broken off.
+
+    141, as the shell has it, where standard output was closed before its end.
+    """
     words = sys.argv[1:] if argv is None else argv
     if not words or words[0] in ("--help", "-h", "help"):
         print(HELP, end="")
         return 0
     try:
-        return _run(words[0], words[1:])
+        status = _run(words[0], words[1:])
+        sys.stdout.flush()
+        return status
     except KeyboardInterrupt:
         print("murmillo: broken off", file=sys.stderr)
         return 130
+    except BrokenPipeError:  # who reads has read enough: `| head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # Python flushes what is left when it ends
+        return 141
     except user_errors() as error:
         print(f"murmillo: {error}", file=sys.stderr)
         return 2

@@ -48,7 +48,8 @@ def _plot(scalars: Scalars, metrics: list[Metric], path: Path) -> Path:
     if len(metrics) > 1:
         axes.set_ylabel("probability" if metrics[0] is AGENT_SCORE else "reward")
         axes.legend(frameon=False)
-    axes.set_ylim(bottom=0.0)
+    if all(np.nanmin(scalars[metric.scalar]) >= 0.0 for metric in metrics):
+        axes.set_ylim(bottom=0.0)
     axes.spines[["top", "right"]].set_visible(False)
     axes.grid(axis="y", alpha=0.3)
     figure.savefig(path)

@@ -1,5 +1,7 @@
 """`murmillo record`: film a trained agent without a screen."""
 
+import math
+import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -45,19 +47,24 @@ class RecordConfig:
 def run(words: list[str]) -> int:
     """Film the run's last checkpoint."""
     # MuJoCo reads its choice when it is imported, so nothing that imports it may come before this line
+    tried = gl.candidates()
     backend = gl.choose()
     from murmillo.cli import config as configuration
     from murmillo.cli import runs
+    from murmillo.cli.seeds import check_seed
 
     settings = configuration.parse(RecordConfig, words)
-    if settings.seconds <= 0:
-        raise CommandError(f"seconds={settings.seconds:g}: needs more than 0")
+    if not 0.0 < settings.seconds < math.inf:  # so written, a NaN is refused too
+        raise CommandError(f"seconds={settings.seconds:g}: needs a number above 0")
+    if settings.blend and len(settings.clips) < 2:
+        raise CommandError("blend=true: goes from one clip to the next; name two or more, clips=[walk_forward,kick]")
+    check_seed("seed", settings.seed)
     folder = runs.existing(settings.run, "run")
-    out = Path(settings.out) if Path(settings.out).parent != Path() else folder / settings.out
-    if out.suffix != ".mp4" or not out.parent.is_dir():
+    out = Path(settings.out) if os.path.dirname(settings.out) else folder / settings.out
+    if out.suffix != ".mp4" or out.is_dir() or not out.parent.is_dir():
         raise CommandError(f"out={settings.out}: needs a file name that ends in .mp4, in a folder that exists")
     if backend is None:
-        raise CommandError(gl.no_gl_message())
+        raise CommandError(gl.no_gl_message(tried))
     print(f"filmed {settings.seconds:g} s: {film(configuration.load(folder), folder, settings, out)}")
     return 0
 
@@ -122,7 +129,11 @@ def _follower(settings: RecordConfig, player: Any, env: Any) -> Callable[[float]
         raise CommandError(
             f"clips={list(settings.clips)}: this run's agent follows no clips; choose a run of agent=calm"
         )
-    latents = player.encode(env.library.middle(settings.clips, player.encoder.frames))
+    library = env.library
+    motions = library.middle(settings.clips, player.encoder.frames)
+    names = [clip.name for clip in library.clips]
+    rows = [names.index(name) for name in settings.clips]
+    latents = player.encode(motions, None if library.mask is None else library.mask[rows])
 
     def follow(part: float) -> None:
         place = part * (len(latents) - 1 if settings.blend else len(latents))

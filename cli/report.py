@@ -1,6 +1,7 @@
 """`report.md` of a run: what was trained, what came of it, what the figures mean, how to go on."""
 
 import csv
+import shlex
 from pathlib import Path
 from typing import Any
 
@@ -34,7 +35,7 @@ def write(folder: Path) -> Path:
     if len(scalars["samples"]):
         plots = plot_all(scalars, folder / runs.PLOTS)
         sections += [_first_and_last(scalars), _minutes(scalars), _pictures(plots, folder)]
-    sections += [_meanings(scalars), _going_on(folder)]
+    sections += [_meanings(scalars), _going_on(folder, config, scalars)]
     path = folder / runs.REPORT
     runs.write_text(path, "\n\n".join(section for section in sections if section) + "\n")
     return path
@@ -189,21 +190,24 @@ def _meanings(scalars: Scalars) -> str:
     return "\n".join(["## What the figures mean", "", *meanings])
 
 
-def _going_on(folder: Path) -> str:
-    return "\n".join(
-        [
-            "## How to go on",
-            "",
-            "```",
-            "# train this run on",
-            f"murmillo train run.resume={folder} runner.max_minutes=60 runner.samples=20_000_000",
+def _going_on(folder: Path, config: Any, scalars: Scalars) -> str:
+    samples = int(scalars["samples"][-1]) if len(scalars["samples"]) else 0
+    run = shlex.quote(str(folder))
+    lines = [
+        "# train this run on, for an hour at most",
+        f"murmillo train run.resume={run} runner.max_minutes=60 runner.samples={max(20_000_000, 2 * samples)}",
+    ]
+    if config.choices.budget == "smoke":
+        clips = "" if config.motions == "builtin" else f" {shlex.quote(f'motions={config.motions}')}"
+        lines += [
             "# a better fighter, in two hours",
-            "murmillo train budget=laptop",
-            "# another film, and surer figures",
-            f"murmillo record run={folder} seconds=20",
-            f"murmillo evaluate run={folder} worlds=256",
-            "# the curves of all runs, live",
-            f"tensorboard --logdir {folder.parent}",
-            "```",
+            f"murmillo train agent={config.choices.agent} budget=laptop{clips}",
         ]
-    )
+    lines += [
+        "# another film, and surer figures",
+        f"murmillo record run={run} seconds=20",
+        f"murmillo evaluate run={run} worlds=256",
+        "# the curves of all runs, live",
+        f"tensorboard --logdir {shlex.quote(str(folder.parent))}",
+    ]
+    return "\n".join(["## How to go on", "", "```", *lines, "```"])

@@ -4,6 +4,7 @@ import json
 import os
 import re
 import time
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -37,14 +38,30 @@ def vacant(root: str, name: str) -> Path:
     Raises:
         CommandError: the name is no name of a folder, or there is such a run already.
     """
-    if not re.fullmatch(r"[\w.+=,-]+", name) or name.startswith("."):
-        raise CommandError(f"run.name={name}: a name has letters, digits and -_.+=, only; folders go into run.root")
+    if not re.fullmatch(r"[\w.+=,-]{1,200}", name) or name.startswith("."):
+        raise CommandError(
+            f"run.name={name}: a name has up to 200 letters, digits and -_.+=, only; a folder is run.root"
+        )
     folder = Path(root) / name
-    if folder.exists():
+    if os.path.exists(folder):
         raise CommandError(f"{folder}: there is such a run already; choose another run.name, or run.resume={folder}")
-    if Path(root).exists() and not Path(root).is_dir():
+    if os.path.isfile(root):
         raise CommandError(f"run.root={root}: this is a file; name a folder for the runs")
     return folder
+
+
+def make(folder: Path) -> None:
+    """Make the folder of a new run.
+
+    Raises:
+        CommandError: the system does not let it.
+    """
+    try:
+        folder.mkdir(parents=True)
+    except OSError as error:
+        raise CommandError(
+            f"{folder}: cannot be made ({error.strerror or error}); choose another run.root or run.name"
+        ) from None
 
 
 def existing(path: str, key: str) -> Path:
@@ -54,9 +71,9 @@ def existing(path: str, key: str) -> Path:
         CommandError: there is none at `path`, which the setting `key` named; with the near names beside it.
     """
     folder = Path(path)
-    if (folder / CONFIG).is_file():
+    if os.path.isfile(folder / CONFIG):  # Path.is_file raises for a name that no file can have
         return folder
-    if folder.is_dir():
+    if os.path.isdir(folder):
         raise CommandError(
             f"{key}={path}: this folder is no run, it has no {CONFIG}; name one that `murmillo train` made"
         )
@@ -67,10 +84,19 @@ def existing(path: str, key: str) -> Path:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a file whole or not at all."""
+    """Write a file whole or not at all.
+
+    Raises:
+        CommandError: the system does not let it.
+    """
     beside = path.with_name(f".{path.name}.part")
-    beside.write_text(text, encoding="utf-8")
-    os.replace(beside, path)
+    try:
+        beside.write_text(text, encoding="utf-8")
+        os.replace(beside, path)
+    except OSError as error:
+        with suppress(OSError):
+            beside.unlink()
+        raise CommandError(f"{path}: cannot be written ({error.strerror or error})") from None
 
 
 def write_json(path: Path, values: Any) -> None:

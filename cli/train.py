@@ -14,12 +14,12 @@ murmillo train: train an agent on motion clips
 
 Settings are written name=value. The first ones:
 
-  agent      ase                                     the method
+  agent      ase, case or calm                       the method
   motions    builtin, a folder or a file             what it learns from
   budget     smoke (10 minutes), laptop (2 hours), paper (as published)
-  ablation   none, no_skill_discovery, no_diversity, neither
+  ablation   none, no_skill_discovery, no_diversity, neither, no_focal, no_masking, residual
   seed       1                                       of everything random
-  num_envs   256                                     worlds that are simulated together
+  num_envs   512                                     worlds that are simulated together
   threads    0                                       CPU threads; 0 takes every core
   run.name   by time, agent, budget and seed         folder of the run under run.root=runs
   run.video  true                                    film the trained character at the end

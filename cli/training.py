@@ -49,19 +49,32 @@ def train(config: TrainConfig, suffix: str = "") -> int:
     torch.set_num_threads(config.threads or versions.usable_cores())
     env = HumanoidVectorEnv(config.num_envs, config.env)
     try:
-        _begin(folder, config, resuming)
-        return _train(config, env, folder, resuming)
-    except user_errors():
-        if not resuming and not (folder / runs.SCALARS).exists():  # not one iteration was made
-            shutil.rmtree(folder, ignore_errors=True)
-        raise
+        if not resuming:
+            runs.make(folder)
+        with _undone_by_mistakes(folder, resuming):
+            _describe(folder, config)
+            return _train(config, env, folder, resuming)
     finally:
         env.close()
 
 
-def _begin(folder: Path, config: TrainConfig, resuming: bool) -> None:
-    """Make the folder with the settings and versions; those of a resumed run take the place of its former ones."""
-    folder.mkdir(parents=True, exist_ok=resuming)
+@contextmanager
+def _undone_by_mistakes(folder: Path, resuming: bool) -> Iterator[None]:
+    """A mistake that shows only now takes a new run's folder away, and gives a resumed one its own settings back."""
+    former = {name: (folder / name).read_bytes() for name in (runs.CONFIG, runs.VERSIONS) if (folder / name).exists()}
+    try:
+        yield
+    except user_errors():
+        if resuming:
+            for name, data in former.items():
+                (folder / name).write_bytes(data)
+        elif not (folder / runs.SCALARS).exists():  # not one iteration was made
+            shutil.rmtree(folder, ignore_errors=True)
+        raise
+
+
+def _describe(folder: Path, config: TrainConfig) -> None:
+    """Write the settings and versions; those of a resumed run take the place of its former ones."""
     kept = dataclasses.replace(config, run=dataclasses.replace(config.run, resume=None))
     configuration.save(kept, folder)
     runs.write_json(folder / runs.VERSIONS, versions.describe(torch.get_num_threads()))
@@ -99,6 +112,7 @@ def _train(config: TrainConfig, env: HumanoidVectorEnv, folder: Path, resuming: 
     runs.write_json(folder / runs.NOTICES, [dataclasses.asdict(notice) for notice in runner.watch.notices])
     logger.close()
     if stopped():
+        (folder / runs.MEASURES).unlink(missing_ok=True)  # of this run when it had ended before: no longer its figures
         report.write(folder)
         print(f"stopped at {runner.samples:,} samples; go on with: murmillo train run.resume={folder}")
         return 0
@@ -165,6 +179,7 @@ def _film(folder: Path) -> None:
     """Record in a process of its own: no graphics driver can then harm the run. One line says why there is no film."""
     command = [sys.executable, "-m", "murmillo.cli.main", "record", f"run={folder}", f"seconds={FILM_S}"]
     done = subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL, check=False)
-    reason = (done.stderr.strip().splitlines() or [f"recording ended with status {done.returncode}"])[-1]
+    lines = done.stderr.strip().splitlines() or [f"recording ended with status {done.returncode}"]
+    reason = lines[-1].removeprefix("murmillo: ")
     runs.write_json(folder / runs.FILMING, {"reason": None if done.returncode == 0 else reason})
     print(done.stdout.strip() if done.returncode == 0 else f"no video: {reason}")

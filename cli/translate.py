@@ -19,7 +19,7 @@ def command_error(error: Exception, known: DictConfig | None) -> CommandError:
         options = [name for name in error.options or () if not name.endswith("_schema")]
         return CommandError(f"{group}={choice}: there is no such choice; {near_names(choice, options)}")
     if isinstance(error, OverrideParseException):
-        return CommandError(f"{error.override}: this is not name=value; quote a value that holds signs: name='va,l=ue'")
+        return unreadable(error.override)
     if unfit := re.match(r"In '(\w+)/(\w+)': ConfigKeyError .*full_key: (\S+)", str(error), re.DOTALL):
         group, choice, key = unfit.groups()
         return CommandError(f"{group}={choice}: it sets {key}, which the chosen agent has not; choose another {group}")
@@ -42,6 +42,11 @@ def command_error(error: Exception, known: DictConfig | None) -> CommandError:
             "or write a list as [a,b]"
         )
     return CommandError(_first_line(error))
+
+
+def unreadable(word: str | None) -> CommandError:
+    """A word whose value cannot be parsed."""
+    return CommandError(f"{word}: this is not name=value; quote a value that holds signs: name='va,l=ue'")
 
 
 def wrong_name(name: str, names: list[str]) -> CommandError:
@@ -82,7 +87,7 @@ def _example(key: str, known: DictConfig | None) -> str:
     if default is None:
         return ""
     if isinstance(default, ListConfig):
-        return f"; it takes a list such as [{','.join(str(item) for item in default)}]"
+        return f"; it takes a list such as [{','.join(str(item) for item in default) or 'a,b'}]"
     kind = _KINDS.get(type(default))
     shown = str(default).lower() if isinstance(default, bool) else default
     return f"; it takes {kind}, such as {shown}" if kind else ""

@@ -56,9 +56,12 @@ class CALM:
         )
 
     @torch.no_grad()
-    def encode(self, window: Tensor) -> Tensor:
-        """z = E(M): latents `[B, Z]` of motions `[B, F, D]`, F = `config.encoder.frames`, oldest frame first."""
-        return self.encoder(Windows(window))
+    def encode(self, window: Tensor, mask: Tensor | None = None) -> Tensor:
+        """z = E(M): latents `[B, Z]` of motions `[B, F, D]`, F = `config.encoder.frames`, oldest frame first.
+
+        `mask` `[B, D]` bool is true for what a motion leaves out, as in training.
+        """
+        return self.encoder(Windows(window, mask=mask))
 
     @torch.no_grad()
     def random_condition(self, n: int) -> Tensor:

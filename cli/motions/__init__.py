@@ -1,10 +1,12 @@
 """`murmillo motions`: bring in motion clips, look at them, change them. Each of its commands is a module here."""
 
 import importlib
-import sys
-from types import ModuleType
+from collections.abc import Callable
+from functools import partial
+from typing import NamedTuple
 
-from murmillo.cli.errors import CommandError, near_names
+from murmillo.cli.errors import CommandError, near_names, user_errors
+from murmillo.cli.motions.arguments import as_options
 
 HELP = """\
 murmillo motions: clips to learn from
@@ -32,15 +34,30 @@ COMMANDS = {
 }
 
 
-def choose(words: list[str]) -> tuple[ModuleType, list[str]]:
-    """The module of the command that the words begin with, and the words that are left for it.
+class Command(NamedTuple):
+    """What a module of a command has."""
+
+    HELP: str
+    run: Callable[[list[str]], int]
+
+
+def choose(words: list[str]) -> tuple[Command, list[str]]:
+    """The command that the words begin with, and the words that are left for it.
 
     Raises:
         CommandError: there is no such command.
     """
     if not words or words[0] in ("--help", "-h"):
-        return sys.modules[__name__], ["--help"]
+        return Command(HELP, lambda words: 0), ["--help"]
     name, *rest = words
     if name not in COMMANDS:
         raise CommandError(f"motions {name}: there is no such command; {near_names(name, list(COMMANDS))}")
-    return importlib.import_module(f"{__name__}.{COMMANDS[name]}"), rest
+    module = importlib.import_module(f"{__name__}.{COMMANDS[name]}")
+    return Command(module.HELP, partial(_run, module.run)), rest
+
+
+def _run(run: Callable[[list[str]], int], words: list[str]) -> int:
+    try:
+        return run(words)
+    except user_errors() as error:
+        raise CommandError(as_options(str(error))) from None

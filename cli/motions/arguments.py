@@ -1,6 +1,7 @@
 """Reading `--option value` words, where every mistake is a `CommandError`."""
 
 import argparse
+import re
 from typing import NoReturn
 
 from murmillo.cli.errors import CommandError, near_names
@@ -27,3 +28,12 @@ class Arguments(argparse.ArgumentParser):
             cure = near_names(unknown[0], known) if unknown[0].startswith("-") else "put its folder or file first"
             raise CommandError(f"{self.prog.removeprefix('murmillo ')}: {unknown[0]}: there is no such option; {cure}")
         return options
+
+
+_SETTING = re.compile(r"(?<![^\s(`])(up|unit|fps|groups|character)=")
+_PLACE = re.compile(r"^motions=")
+
+
+def as_options(message: str) -> str:
+    """An error of the suite, which names its settings, for a command that takes options: fps=0 becomes --fps=0."""
+    return _SETTING.sub(r"--\1=", _PLACE.sub("", message))

@@ -1,6 +1,9 @@
 """Clips as the commands take and leave them: found by a path, chosen by name, saved as a folder."""
 
-from collections.abc import Sequence
+import os
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+from itertools import chain, count
 from pathlib import Path
 
 from murmillo.cli.errors import CommandError, near_names
@@ -27,14 +30,14 @@ def load(path: str, character: str | None = None) -> tuple[list[Clip], Character
 def _character_of(path: str) -> str:
     place = Path(path)
     manifest = (place.parent if place.suffix.lower() == ".npz" else place) / MANIFEST
-    if path == BUILTIN or not manifest.is_file():
+    if path == BUILTIN or not os.path.isfile(manifest):  # Path.is_file raises for a name that no file can have
         return DEFAULT_CHARACTER
     return read_manifest(read_bytes(manifest), str(manifest))[0]
 
 
 def is_saved(path: str) -> bool:
     """Whether there is a folder of clips that murmillo saved, which needs no conversion."""
-    return (Path(path) / MANIFEST).is_file()
+    return os.path.isfile(Path(path) / MANIFEST)
 
 
 def select(clips: Sequence[Clip], name: str | None) -> list[Clip]:
@@ -49,6 +52,18 @@ def select(clips: Sequence[Clip], name: str | None) -> list[Clip]:
     if not chosen:
         raise CommandError(f"--clip {name}: there is no such clip; {near_names(name, [clip.name for clip in clips])}")
     return chosen
+
+
+def told_apart(new: Sequence[Clip], taken: Collection[str] = ()) -> list[Clip]:
+    """The new clips, numbered where a name is taken, by one of these or by a clip before; in any case of letters."""
+    names = {name.casefold() for name in taken}
+    named = []
+    for clip in new:
+        numbered = (f"{clip.name}_{number}" for number in count(2))
+        name = next(name for name in chain([clip.name], numbered) if name.casefold() not in names)
+        names.add(name.casefold())
+        named.append(replace(clip, name=name))
+    return named
 
 
 def check_folder(folder: str, replace: bool) -> None:

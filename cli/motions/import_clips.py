@@ -4,12 +4,11 @@ import argparse
 import dataclasses
 import sys
 from collections.abc import Sequence
-from itertools import chain, count
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from murmillo.cli.errors import CommandError
-from murmillo.cli.motions.arguments import Arguments
+from murmillo.cli.motions.arguments import Arguments, as_options
 
 if TYPE_CHECKING:
     from murmillo.cli.motions.convert import Made
@@ -57,7 +56,8 @@ MAX_JOBS = 8
 def run(words: list[str]) -> int:
     """Convert the files and write the clips together at the end, so that breaking it off leaves nothing behind."""
     options = _parse(words)
-    from murmillo.cli.motions import clips
+    from murmillo.cli import runs
+    from murmillo.cli.motions import clips, import_table
     from murmillo.cli.motions.convert import Made, Order, convert_all
     from murmillo.envs.character import load_character
     from murmillo.envs.motion import load_clips
@@ -77,14 +77,14 @@ def run(words: list[str]) -> int:
     made = _finished([outcome for outcome in outcomes if isinstance(outcome, Made)], options, failures)
     if made:
         _show(made)
-    if options.report:
-        _write_report(made, failures, options.report)
     for failure in failures:
-        print(f"murmillo: not imported: {failure}", file=sys.stderr)
+        print(f"murmillo: not imported: {as_options(failure)}", file=sys.stderr)
     if not made and not joined:
         if len(failures) != 1:
             print(f"murmillo: none of {len(files)} files could be imported", file=sys.stderr)
         return 2
+    if options.report:
+        runs.write_text(Path(options.report), import_table.markdown(made, failures))
     clips.save(options.to, _merged(kept, [*joined, *(one.clip for one in made)]))
     return 0
 
@@ -169,30 +169,18 @@ def _finished(made: "Sequence[Made]", options: argparse.Namespace, failures: lis
 
 def _merged(kept: "Sequence[Clip]", new: "Sequence[Clip]") -> "list[Clip]":
     """New clips take the place of kept ones of their name; of new ones that share a name, the later get a number."""
-    names: set[str] = set()
-    named = []
-    for clip in new:
-        numbered = (f"{clip.name}_{number}" for number in count(2))
-        name = next(name for name in chain([clip.name], numbered) if name.casefold() not in names)
-        names.add(name.casefold())
-        named.append(dataclasses.replace(clip, name=name))
+    from murmillo.cli.motions import clips
+
+    named = clips.told_apart(new)
+    names = {clip.name.casefold() for clip in named}
     return [*(clip for clip in kept if clip.name.casefold() not in names), *named]
 
 
 def _show(made: "Sequence[Made]") -> None:
-    from murmillo.cli.motions import import_table, tables
+    from murmillo.cli import tables
+    from murmillo.cli.motions import import_table
 
     tables.show(import_table.COLUMNS, import_table.rows(made), import_table.LEFT)
     for name, text in import_table.common_findings(made).items():
         print(import_table.described(name, text))
     print(import_table.MEANING)
-
-
-def _write_report(made: "Sequence[Made]", failures: Sequence[str], path: str) -> None:
-    from murmillo.cli import runs
-    from murmillo.cli.motions import import_table
-
-    try:
-        runs.write_text(Path(path), import_table.markdown(made, failures))
-    except OSError as error:
-        raise CommandError(f"--report {path}: cannot be written ({error.strerror or error}); name another") from None

@@ -27,6 +27,8 @@ MEANING = (
 
 def common_findings(made: Sequence[Made]) -> dict[str, str]:
     """What was found out about every file alike."""
+    if not made:
+        return {}
     first, *others = (one.findings for one in made)
     return {name: text for name, text in first.items() if all(other.get(name) == text for other in others)}
 

@@ -28,7 +28,8 @@ def run(words: list[str]) -> int:
     parser.add_argument("--tracking", action="store_true")
     parser.add_argument("--character")
     options = parser.parse(words)
-    from murmillo.cli.motions import clips, tables
+    from murmillo.cli import tables
+    from murmillo.cli.motions import clips
     from murmillo.envs.motion.inspection import TRACKING_EVERY, Suspicion, inspect
     from murmillo.envs.motion.measures import measure
 

@@ -58,7 +58,9 @@ def run(words: list[str]) -> int:
         name = "from" if needed == "labelled" else needed
         raise CommandError(f"--by {options.by}: needs --{name}; `murmillo motions label --help` shows an example")
     from murmillo.cli.motions import clips
+    from murmillo.cli.seeds import check_seed
 
+    check_seed("--seed", options.seed)
     clips.check_folder(options.to, options.replace)
     found, character = clips.load(options.path, options.character)
     labelled = _label(found, character, options)

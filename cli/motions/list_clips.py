@@ -19,7 +19,8 @@ def run(words: list[str]) -> int:
     parser.add_argument("path")
     parser.add_argument("--character")
     options = parser.parse(words)
-    from murmillo.cli.motions import clips, tables
+    from murmillo.cli import tables
+    from murmillo.cli.motions import clips
     from murmillo.envs.motion.licences import terms_of
 
     found, character = clips.load(options.path, options.character)
@@ -42,5 +43,5 @@ def run(words: list[str]) -> int:
     tables.show(columns, rows, left=("clip", "label", "loop", "masked", "licence", "redistributable", "source"))
     labels = len({clip.label for clip in found})
     print(f"{len(found)} clips of {labels} labels for {character.name}, {sum(clip.duration for clip in found):.1f} s")
-    print(f"{terms_of(found)}")
+    print(terms_of(found))
     return 0

@@ -47,5 +47,5 @@ def run(words: list[str]) -> int:
     named = [
         dataclasses.replace(clip, name=f"{clip.name}_mirrored") if clip.name in taken else clip for clip in mirrored
     ]
-    clips.save(options.to, [*found, *named])
+    clips.save(options.to, [*found, *clips.told_apart(named, taken)])
     return 0

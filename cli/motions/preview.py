@@ -13,7 +13,7 @@ murmillo motions preview: draw clips
   PATH         builtin, a folder of clips, a file of one, or ASE's .npy clips
   --clip       name of the only clip to be drawn
   --to         needed          folder for the pictures, one a clip
-  --sheet      contact sheets, PNG: moments from left to right, seen from behind, the side and ahead (the default)
+  --sheet      contact sheets, PNG: moments from left to right, seen aslant, from the right and from ahead (the default)
   --film       films, mp4, at the clip's own speed
   --camera     track           of the film: track, side or front
   --character  whose clips: by default the folder's own
@@ -34,8 +34,9 @@ def run(words: list[str]) -> int:
     parser.add_argument("--character")
     options = parser.parse(words)
     # MuJoCo reads its choice when it is imported, so nothing that imports it may come before this line
+    tried = gl.candidates()
     if gl.choose() is None:
-        raise CommandError(gl.no_gl_message())
+        raise CommandError(gl.no_gl_message(tried))
     from pathlib import Path
 
     from murmillo.cli.motions import clips

@@ -14,7 +14,8 @@ from murmillo.envs.motion.clip import Clip, check_clip
 from murmillo.envs.rotations import slerp
 
 _SIDES = {"left": "right", "right": "left", "Left": "Right", "Right": "Left", "LEFT": "RIGHT", "RIGHT": "LEFT"}
-_OTHER_SIDE = re.compile("|".join(_SIDES))
+_OTHER_SIDE = re.compile(rf"(?<!up)(?<!Up)(?:{'|'.join(_SIDES)})")
+"""Who stands upright stands on no side."""
 _MIRROR_ROTATION = (1.0, -1.0, 1.0, -1.0)
 """Reflection in the plane y = 0 turns a rotation's axis (x, y, z) into (-x, y, -z); so for a wxyz quaternion."""
 

@@ -98,7 +98,7 @@ def _wrong_fields(entry: Any) -> str:
         fits = isinstance(value, kind) and (kind is bool or not isinstance(value, bool))
         if not fits or (kind == _NUMBER and not 0.0 < value < 1e9):
             wrong.add(key)
-    if not all(isinstance(body, str) for body in entry.get("masked", ())):
+    if "masked" not in wrong and not all(isinstance(body, str) for body in entry.get("masked", ())):
         wrong.add("masked")
     if "file" not in wrong and not _PLAIN_NAME.fullmatch(entry["file"]):
         wrong.add("file (must be a plain name)")

@@ -95,11 +95,18 @@ def check_destination(folder: str | Path) -> None:
 
 
 def _refuse_foreign(folder: Path) -> None:
-    if folder.exists():
-        old = [entry.name for entry in folder.iterdir()]
-        foreign = [name for name in old if name != MANIFEST and not name.endswith(".npz")]
-        if foreign or (old and MANIFEST not in old):
-            raise MotionError(f"{folder}: holds other files than saved clips; choose a new or an empty folder")
+    """Only what a manifest lists may be replaced: a recording beside it could be the only copy."""
+    if folder.exists() and {entry.name for entry in folder.iterdir()} - _saved_files(folder / MANIFEST):
+        raise MotionError(f"{folder}: holds other files than saved clips; choose a new or an empty folder")
+
+
+def _saved_files(manifest: Path) -> set[str]:
+    """The names that `save_clips` wrote: the manifest's own and those that it lists; none where it cannot be read."""
+    try:
+        _, entries = read_manifest(read_bytes(manifest), str(manifest))
+    except MotionError:
+        return set()
+    return {MANIFEST, *(entry["file"] for entry in entries)}
 
 
 def _replace_folder(folder: Path, contents: dict[str, bytes]) -> None:

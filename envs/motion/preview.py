@@ -20,6 +20,8 @@ CAMERAS = ("track", "side", "front")
 def contact_sheet(clip: Clip, character: Character, file: Path, columns: int = 12, size: int = 260) -> Path:
     """Write a PNG and return its path: a row a camera, `columns` moments of the clip evenly spaced, from left to right.
 
+    The character fills the pictures, as large in all of a row; sword and shield are never cut off.
+
     Args:
         size: width and height of each picture in it [pixels].
 
@@ -27,7 +29,7 @@ def contact_sheet(clip: Clip, character: Character, file: Path, columns: int = 1
         SuiteError: nothing can be drawn here, or the file cannot be written.
     """
     moments = np.linspace(0, clip.frames - 1, columns).round().astype(int)
-    seen = list(_draw(clip.qpos[moments], character, CAMERAS, (size, size)))
+    seen = list(_draw(clip.qpos[moments], character, CAMERAS, (size, size), filling=True))
     with _whole(file) as beside:
         imageio.imwrite(beside, np.vstack([np.hstack(row) for row in zip(*seen, strict=True)]))
     return file
@@ -50,15 +52,25 @@ def film(
 
 
 def _draw(
-    poses: NDArray[np.float64], character: Character, cameras: Sequence[str], size: tuple[int, int]
+    poses: NDArray[np.float64],
+    character: Character,
+    cameras: Sequence[str],
+    size: tuple[int, int],
+    filling: bool = False,
 ) -> Iterator[list[NDArray[np.uint8]]]:
-    """Of each of the poses [F, nq] the pictures [height, width, 3] that these cameras take."""
+    """Of each of the poses [F, nq] the pictures [height, width, 3] that these cameras take.
+
+    `filling` opens each camera just so far that the character is whole in all of the poses.
+    """
     model = character.render_model(offscreen=size)
     known = [model.camera(i).name for i in range(model.ncam)]
     for camera in cameras:
         if camera not in known:
             raise SuiteError(f"camera={camera}: no such camera; there are: {', '.join(known)}")
     data = mujoco.MjData(model)
+    if filling:
+        for camera in cameras:
+            model.camera(camera).fovy = _view(model, data, poses, camera, size[0] / size[1])
     try:
         renderer = mujoco.Renderer(model, size[1], size[0])
     except Exception as error:
@@ -74,6 +86,22 @@ def _draw(
                 renderer.update_scene(data, camera)
                 pictures.append(renderer.render().copy())
             yield pictures
+
+
+def _view(model: mujoco.MjModel, data: mujoco.MjData, poses: NDArray[np.float64], camera: str, aspect: float) -> float:
+    """The vertical field of view [degrees] in which the character is whole in all of the poses, with a small margin."""
+    geoms = np.flatnonzero(model.geom_bodyid)  # the floor is the world's
+    signs = np.stack(np.meshgrid(*[(-1.0, 1.0)] * 3), axis=-1).reshape(8, 3)
+    corners = model.geom_aabb[geoms, None, :3] + signs * model.geom_aabb[geoms, None, 3:]
+    tangent = 0.0
+    for pose in poses:
+        data.qpos = pose
+        mujoco.mj_forward(model, data)
+        turned = corners @ data.geom_xmat[geoms].reshape(-1, 3, 3).transpose(0, 2, 1)
+        seen = data.camera(camera)
+        points = (turned + data.geom_xpos[geoms, None] - seen.xpos) @ seen.xmat.reshape(3, 3)  # it looks along -z
+        tangent = max(tangent, float((np.abs(points[..., :2]) / [aspect, 1.0] / -points[..., 2:]).max()))
+    return float(np.degrees(2.0 * np.arctan(1.05 * tangent)))
 
 
 @contextmanager

@@ -32,6 +32,10 @@ def test_trains_resumes_and_is_measured(agent: str, murmillo: Murmillo, folder: 
     assert AGENTS[agent].labelled == bool(measures["trained"]["heads"])
     assert AGENTS[agent].labelled == (folder / "runs/one/skills.json").exists()
     assert (agent == "calm") == (measures["trained"]["concentration"] is not None)
+    status, out, err = murmillo("evaluate", "run=runs/one", "worlds=2")
+    assert status == 0, err
+    assert ("Fisher concentration" in out) == (agent == "calm")
+    assert ("commanded skill's head" in out) == AGENTS[agent].labelled
 
 
 def test_residual_forces_reach_the_report(murmillo: Murmillo, folder: Path, tiny: tuple[str, ...]) -> None:

@@ -51,6 +51,13 @@ def assert_refused(done: tuple[int, str, str], *parts: str) -> None:
         (("evaluate", "run=runs/nothing"), ("run=runs/nothing",)),
         (("evaluate", "rum=x"), ("rum", "run")),
         (("evaluate", "run"), ("run", "name=value")),
+        (("evaluate", "run=[x"), ("run=[x", "name=value")),
+        (("evaluate", "run=${x}"), ("run", "not found")),
+        (("evaluate", f"run={'x' * 300}"), ("there is no such run",)),
+        (("evaluate", "run=x", "seed=-1"), ("seed=-1", "from 0")),
+        (("train", "run.root=/dev/null/runs"), ("/dev/null/runs", "cannot be made", "run.root")),
+        (("train", f"run.root={'x' * 300}"), ("cannot be made",)),
+        (("train", f"run.name={'x' * 300}"), ("run.name=", "up to 200")),
         (("doctor", "now"), ("now",)),
     ],
 )
@@ -102,12 +109,41 @@ def test_a_reward_weight_without_a_reward(murmillo: Murmillo, folder: Path, tiny
     assert not (folder / "runs").exists() or list((folder / "runs").iterdir()) == []
 
 
+@pytest.mark.parametrize("word", ["+runner.reward_weights.bounty=1", "runner.reward_weights.bounty=1"])
+def test_a_resumption_that_fails_leaves_the_settings_as_they_were(murmillo: Murmillo, own_run: Path, word: str) -> None:
+    before = {name: (own_run / name).read_bytes() for name in ("config.yaml", "versions.json", "scalars.csv")}
+    assert_refused(murmillo("train", "run.resume=runs/tiny", "runner.samples=192", word))
+    assert {name: (own_run / name).read_bytes() for name in before} == before
+    assert murmillo("train", "run.resume=runs/tiny", "runner.samples=192")[0] == 0
+
+
+def test_the_help_names_every_choice(murmillo: Murmillo) -> None:
+    from murmillo.cli.config import compose_train
+
+    text = murmillo("train", "--help")[1]
+    for group in ("agent", "budget", "ablation"):
+        for file in files("murmillo.conf").joinpath(group).iterdir():
+            assert Path(file.name).stem in text
+    assert f"num_envs   {compose_train([]).num_envs} " in text
+
+
 def test_from_the_shell(folder: Path) -> None:
     """The console script itself: status, streams and no traceback."""
     command = [sys.executable, "-m", "murmillo.cli.main", "train", "sed=1"]
     done = subprocess.run(command, capture_output=True, text=True, cwd=folder, check=False)
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr == "murmillo: sed: there is no such setting; did you mean seed?\n"
+
+
+def test_a_reader_that_has_read_enough(folder: Path) -> None:
+    """As `| head -1`: no traceback."""
+    command = [sys.executable, "-m", "murmillo.cli.main", "motions", "list", "builtin"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=folder) as process:
+        assert process.stdout is not None
+        process.stdout.close()
+        assert process.stderr is not None
+        assert process.stderr.read() == ""
+    assert process.returncode in (1, 141)  # 1 is what rich makes of it while it draws a table
 
 
 @pytest.mark.parametrize("words", [(), ("--help",), ("train", "--help"), ("evaluate", "-h"), ("record", "--help")])

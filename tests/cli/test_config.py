@@ -138,6 +138,13 @@ def test_a_wrong_word_is_named_in_one_line(word: str, parts: tuple[str, ...]) ->
         (["env.window=3"], ("env.window=3", "agent.window=10")),
         (["env.autoreset=next_step"], ("env.autoreset=next_step", "same_step")),
         (["threads=-1"], ("threads=-1",)),
+        (["seed=-1"], ("seed=-1", "from 0")),
+        (["warm_start.steps=-1"], ("warm_start.steps=-1", "at least 0")),
+        (["runner.max_minutes=-1"], ("runner.max_minutes=-1", "at least 0")),
+        (["agent.discriminator.updates=0"], ("agent.discriminator.updates=0", "at least 1")),
+        (["runner.gamma=2"], ("runner.gamma=2", "0 to 1")),
+        (["agent.ppo.hidden=[]"], ("agent.ppo.hidden=[]", "each layer")),
+        (["agent=calm", "agent.encoder.hidden=[8,0]"], ("agent.encoder.hidden=[8,0]", "each layer")),
         (["+runner.reward_weights.residual=0.1"], ("runner.reward_weights.residual=0.1", "env.residual_force")),
     ],
 )
@@ -160,9 +167,13 @@ def test_saved_settings_load_again(tmp_path: Path) -> None:
 
 
 def test_settings_of_another_version_are_refused_by_name(tmp_path: Path) -> None:
-    (tmp_path / "config.yaml").write_text("seeed: 3\n")
+    (tmp_path / "config.yaml").write_text("seeed: 3\nchoices: {agent: ase}\n")
     with pytest.raises(CommandError, match=r"config\.yaml: seeed: there is no such setting; did you mean seed"):
         configuration.load(tmp_path)
+    for text in ("", "- a\n", "choices: 3\n", "choices: {agent: pose}\n"):
+        (tmp_path / "config.yaml").write_text(text)
+        with pytest.raises(CommandError, match=r"config\.yaml: choices\.agent: is none of ase, case, calm"):
+            configuration.load(tmp_path)
     (tmp_path / "config.yaml").write_text("a: [\n")
     with pytest.raises(CommandError, match=r"config\.yaml: no configuration that can be read"):
         configuration.load(tmp_path)

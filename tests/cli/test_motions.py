@@ -108,6 +108,24 @@ def test_mirror_images_of_a_pair_keep_names_apart(murmillo: Murmillo, builtin: d
     assert clips["turn_right_90_mirrored"].label == "turn_right_90"
 
 
+def test_mirrored_again_every_image_has_a_name(murmillo: Murmillo, pair: str) -> None:
+    assert murmillo("motions", "mirror", pair, "--to", "both").status == 0
+    assert murmillo("motions", "mirror", "both", "--to", "again").status == 0
+    assert list(loaded("again"))[4:] == [
+        "guard_mirrored_mirrored",
+        "turn_right_90_mirrored",
+        "guard_mirrored_mirrored_2",
+        "turn_left_90_mirrored",
+    ]
+
+
+def test_clips_are_told_apart_whatever_the_case_of_letters(builtin: dict[str, Clip]) -> None:
+    from murmillo.cli.motions.clips import told_apart
+
+    new = [replace(builtin["guard"], name=name) for name in ("Walk", "run", "Run", "run_2")]
+    assert [clip.name for clip in told_apart(new, ["walk"])] == ["Walk_2", "run", "Run_2", "run_2_2"]
+
+
 def test_label_by_name_and_by_file(murmillo: Murmillo, pair: str, folder: Path) -> None:
     assert murmillo("motions", "label", pair, "--by", "from-name", "--rule", "content", "--to", "a").status == 0
     assert {name: clip.label for name, clip in loaded("a").items()} == {"guard": "guard", "turn_left_90": "turn"}
@@ -155,10 +173,10 @@ def test_preview(murmillo: Murmillo, folder: Path, builtin: dict[str, Clip], mon
     [
         (("lst",), ("lst", "list")),
         (("list",), ("motions list", "path", "--help")),
-        (("list", "nowhere"), ("nowhere", "no such file or folder")),
+        (("list", "nowhere"), ("murmillo: nowhere: there is no such file or folder",)),
         (("list", "builtin", "--chracter", "x"), ("--chracter", "--character")),
         (("list", "builtin", "more"), ("more", "no such option")),
-        (("list", "builtin", "--character", "dragon"), ("character=dragon", "sword_shield")),
+        (("list", "builtin", "--character", "dragon"), ("--character=dragon", "sword_shield")),
         (("inspect", "builtin", "--clip", "gaurd"), ("--clip gaurd", "guard")),
         (("preview", "builtin"), ("motions preview", "--to")),
         (("trim", "builtin", "--clip", "guard", "--start", "9", "--to", "out"), ("guard", "9", "lasts")),
@@ -169,7 +187,9 @@ def test_preview(murmillo: Murmillo, folder: Path, builtin: dict[str, Clip], mon
         (("label", "builtin", "--by", "magic", "--to", "out"), ("magic", "from-name")),
         (("label", "builtin", "--by", "cluster", "--to", "out"), ("--by cluster", "--groups")),
         (("label", "builtin", "--by", "classify", "--to", "out"), ("--by classify", "--from")),
-        (("label", "builtin", "--by", "random", "--groups", "999", "--to", "out"), ("groups=999",)),
+        (("label", "builtin", "--by", "random", "--groups", "999", "--to", "out"), ("--groups=999",)),
+        (("label", "builtin", "--by", "random", "--groups", "2", "--seed", "-1", "--to", "out"), ("--seed=-1",)),
+        (("list", "x" * 300), ("no such file or folder",)),
         (("label", "builtin", "--by", "from-name", "--rule", "(", "--to", "out"), ("rule", "content")),
         (("label", "builtin", "--by", "file", "--file", "no.csv", "--to", "out"), ("no.csv", "cannot be read")),
     ],

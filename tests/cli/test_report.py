@@ -8,7 +8,7 @@ import pytest
 from omegaconf import OmegaConf
 
 from murmillo.cli import report, runs
-from murmillo.cli.plots import smooth
+from murmillo.cli.plots import plot_all, smooth
 
 
 @pytest.fixture
@@ -53,6 +53,30 @@ def test_report_has_the_figures(run_folder: Path) -> None:
     assert "fall_rate.png" not in text
 
 
+def test_a_short_run_is_told_by_its_quarters(run_folder: Path) -> None:
+    with (run_folder / runs.SCALARS).open("w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(["samples", "iteration", "samples_per_second", "episode/length"])
+        writer.writerows([1000 * i, i, 100.0, 10.0 * i] for i in range(1, 5))
+    text = report.write(run_folder).read_text()
+    assert "| | first 10 s | last 10 s |" in text
+    assert "| Episode length | 10 steps | 40 steps |" in text
+
+
+def test_a_plot_shows_values_below_zero(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from matplotlib.figure import Figure
+
+    lowest: dict[str, float] = {}
+    monkeypatch.setattr(
+        Figure, "savefig", lambda figure, path: lowest.update({path.stem: figure.axes[0].get_ylim()[0]})
+    )
+    scalars = {"seconds": np.array([1.0, 2.0]), "reward/style": np.array([0.5, 1.0])}
+    plot_all(scalars, tmp_path / "plots")
+    assert lowest == {"rewards": 0.0}
+    plot_all(scalars | {"reward/skill": np.array([-0.5, np.nan])}, tmp_path / "plots")
+    assert lowest["rewards"] < -0.5
+
+
 def test_report_says_how_well_the_encoder_knows_the_clips(run_folder: Path) -> None:
     assert "Fisher" not in report.write(run_folder).read_text()
     measures = runs.read_json(run_folder / runs.MEASURES)
@@ -85,6 +109,19 @@ def test_report_says_why_there_is_no_video(run_folder: Path) -> None:
     assert "No video: no OpenGL" in report.write(run_folder).read_text()
     (run_folder / runs.VIDEO).touch()
     assert "(video.mp4)" in report.write(run_folder).read_text()
+
+
+def test_report_says_how_to_go_on(run_folder: Path) -> None:
+    text = report.write(run_folder).read_text()
+    assert f"murmillo train run.resume={run_folder} runner.max_minutes=60 runner.samples=20000000\n" in text
+    assert "murmillo train agent=ase budget=laptop\n" in text
+    config = OmegaConf.load(run_folder / runs.CONFIG)
+    config.choices.agent, config.motions = "case", "my clips"
+    OmegaConf.save(config, run_folder / runs.CONFIG)
+    assert "murmillo train agent=case budget=laptop 'motions=my clips'\n" in report.write(run_folder).read_text()
+    config.choices.budget = "laptop"
+    OmegaConf.save(config, run_folder / runs.CONFIG)
+    assert "budget=laptop" not in report.write(run_folder).read_text()
 
 
 def test_report_of_a_run_without_an_iteration(run_folder: Path) -> None:

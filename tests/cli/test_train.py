@@ -43,6 +43,17 @@ def test_resume_goes_on_with_the_same_settings(murmillo: Murmillo, own_run: Path
     assert "seed=2" in err
 
 
+def test_a_resumed_run_that_is_stopped_keeps_no_figures_of_before(
+    murmillo: Murmillo, own_run: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert "## Did it learn?" in (own_run / "report.md").read_text()
+    monkeypatch.setattr("murmillo.cli.training.Runner.run", lambda runner: signal.raise_signal(signal.SIGTERM))
+    status, out, err = murmillo("train", "run.resume=runs/tiny", "runner.samples=192")
+    assert status == 0, err
+    assert "stopped at 128 samples" in out
+    assert "## Did it learn?" not in (own_run / "report.md").read_text()
+
+
 def test_resumed_run_equals_an_uninterrupted_one(murmillo: Murmillo, own_run: Path, tiny: tuple[str, ...]) -> None:
     """64 + 64 + 64 samples through a checkpoint and 192 at once end in the same figures."""
     assert murmillo("train", "run.resume=runs/tiny", "runner.samples=192")[0] == 0

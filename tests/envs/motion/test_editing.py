@@ -32,7 +32,16 @@ def test_only_a_whole_loop_stays_one() -> None:
 
 @pytest.mark.parametrize(
     ("start", "end"),
-    [(-0.1, None), (1.0, 1.0), (2.0, 1.0), (0.0, 100.0), (1.0, 1.01), (float("nan"), 1.0), (99.0, None)],
+    [
+        (-0.1, None),
+        (1.0, 1.0),
+        (2.0, 1.0),
+        (0.0, 100.0),
+        (0.0, WALK.duration + 0.02),
+        (1.0, 1.01),
+        (float("nan"), 1.0),
+        (99.0, None),
+    ],
 )
 def test_trim_refuses_times_that_leave_no_clip(start: float, end: float | None) -> None:
     with pytest.raises(MotionError, match="clip walk_forward: "):
@@ -99,6 +108,7 @@ def test_mirroring_twice_gives_the_clip_back_but_for_the_wrist() -> None:
         ("turn_left_90", "turn_right_90"),
         ("WalkRight01", "WalkLeft01"),
         ("kick", "kick_mirrored"),
+        ("upright", "upright_mirrored"),
     ],
 )
 def test_names_change_sides(name: str, mirrored: str) -> None:

@@ -94,6 +94,7 @@ def test_one_clip_of_a_folder(pack, character):
         (lambda m: m["clips"][0].update(weight=10**400), "wrong fields: 'weight'"),
         (lambda m: m["clips"][0].update(masked="sword"), "wrong fields: 'masked'"),
         (lambda m: m["clips"][0].update(masked=[1]), "wrong fields: 'masked'"),
+        (lambda m: m["clips"][0].update(masked=3), "wrong fields: 'masked'"),
         (lambda m: m["clips"][0].update(speed=1.0), "wrong fields: 'speed'"),
         (lambda m: m["clips"][0].update(file="../walk.npz"), "plain name"),
         (lambda m: m["clips"][0].update(file="absent.npz"), "absent.npz: cannot be read"),
@@ -201,6 +202,14 @@ def test_a_save_replaces_older_clips_and_nothing_else(pack, make_clip, character
     with pytest.raises(MotionError, match="holds other files"):
         save_clips(pack, [make_clip("other")])
     assert set(contents(pack)) == {"manifest.json", "only.npz", "notes.txt"}
+
+
+def test_a_recording_beside_saved_clips_is_not_lost(pack, make_clip):
+    (pack / "recording.npz").write_bytes(b"the only copy")
+    before = contents(pack)
+    with pytest.raises(MotionError, match="holds other files"):
+        save_clips(pack, [make_clip("other")])
+    assert contents(pack) == before
 
 
 def test_what_cannot_be_saved(tmp_path, make_clip):

@@ -114,6 +114,7 @@ def test_random_labels_are_even_and_repeat() -> None:
     clips = list(CLIPS.values())[:11]
     labels = [clip.label for clip in at_random(clips, 4, seed=1)]
     assert sorted(Counter(labels).values()) == [2, 3, 3, 3]
+    assert sorted(Counter(clip.label for clip in at_random(clips[:5], 4)).values()) == [1, 1, 1, 2]
     assert labels == [clip.label for clip in at_random(clips, 4, seed=1)]
     assert labels != [clip.label for clip in at_random(clips, 4, seed=2)]
 

@@ -4,13 +4,15 @@ from pathlib import Path
 
 import imageio.v2 as imageio
 import imageio_ffmpeg
+import mujoco
+import numpy as np
 import pytest
 
 from murmillo.envs.character import load_character
 from murmillo.envs.errors import SuiteError
 from murmillo.envs.motion import Clip, load_clips
 from murmillo.envs.motion.editing import trim
-from murmillo.envs.motion.preview import contact_sheet, film
+from murmillo.envs.motion.preview import CAMERAS, _view, contact_sheet, film
 
 CHARACTER = load_character("sword_shield")
 
@@ -54,3 +56,30 @@ def test_nothing_is_left_of_what_cannot_be_drawn(tmp_path: Path, clip: Clip) -> 
     with pytest.raises(SuiteError, match="cannot be written"):
         contact_sheet(clip, CHARACTER, tmp_path / "file/kick.png", columns=1, size=16)
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+@pytest.mark.parametrize("camera", CAMERAS)
+def test_the_character_fills_a_sheet_and_is_whole(camera: str) -> None:
+    """Its pixels reach across most of the picture, and none is at the edge."""
+    kick = next(clip for clip in load_clips("builtin", CHARACTER) if clip.name == "kick")
+    model = CHARACTER.render_model(offscreen=(200, 200))
+    data = mujoco.MjData(model)
+    poses = kick.qpos[::10]
+    model.camera(camera).fovy = _view(model, data, poses, camera, aspect=1.0)
+    try:
+        renderer = mujoco.Renderer(model, 200, 200)
+    except Exception as error:
+        pytest.skip(f"no OpenGL draws on this machine: {error}")
+    with renderer:
+        renderer.enable_segmentation_rendering()
+        seen = np.zeros((200, 200), dtype=bool)
+        for pose in poses:
+            data.qpos = pose
+            mujoco.mj_forward(model, data)
+            renderer.update_scene(data, camera)
+            geom = renderer.render()[..., 0]
+            seen |= (geom >= 0) & (model.geom_bodyid[geom] > 0)
+    assert not seen[[0, -1]].any()
+    assert not seen[:, [0, -1]].any()
+    rows, columns = np.flatnonzero(seen.any(1)), np.flatnonzero(seen.any(0))
+    assert max(np.abs(rows - 99.5).max(), np.abs(columns - 99.5).max()) > 0.85 * 100
