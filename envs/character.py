@@ -18,6 +18,7 @@ CONTROL_DT = 1.0 / 30.0
 """Seconds between two actions: the papers' 30 Hz."""
 
 _KEY = "key_"  # sites of this prefix are the papers' key points
+_KEY_ORDER = ("right_hand", "left_hand", "right_foot", "left_foot", "sword", "shield")
 _GROUND = "ground_"  # contact sensors of this prefix hold the ground's force on a body
 _VISUAL_GROUP = 2  # geoms that are seen but touch nothing
 _BOX = 6  # bounds of a ball joint's exponential map
@@ -37,8 +38,9 @@ class Character:
         control_dt, substeps: seconds of a control step, and physics steps in it.
         bodies: names of the B bodies without the world, in MJCF order.
         joints: the joints without the root, in MJCF order, which is also the order of the actions.
-        key_bodies: names of the K key points.
+        key_bodies, key_sites: names of the K key points, and the ids of their sites in the model.
         feet: the bodies that may touch the ground.
+        contact_slice: where the model's sensor data hold the ground's force on each body, [B * 3] [N].
         action_offset, action_scale: [A] [rad], float64.
         joint_limits: [A, 2] lowest and highest joint coordinate [rad], float64: of a hinge its range, of a ball joint
             the box of its exponential map (the MJCF's `user`), which the engine does not enforce.
@@ -124,9 +126,6 @@ class Character:
         return spec.compile()
 
 
-_KEY_ORDER = ("right_hand", "left_hand", "right_foot", "left_foot", "sword", "shield")
-
-
 def load_character(name: str = "sword_shield", edit: SpecEdit | None = None) -> Character:
     """Load `assets/mjcf/<name>.xml`; `edit` may change the spec (body shapes, props, terrain) before it is compiled.
 
@@ -183,6 +182,8 @@ def _joints(name: str, model: mujoco.MjModel) -> list[Joint]:
     joints, action = [], 0
     for i in range(1, model.njnt):
         joint = model.joint(i)
+        if int(joint.type[0]) not in widths:
+            raise SuiteError(f"{name}.xml: joint {joint.name} is neither a ball nor a hinge; make it one of them")
         kind, nq, nv = widths[int(joint.type[0])]
         if any(int(model.actuator_trnid[a, 0]) != i for a in range(action, action + nv)):
             raise SuiteError(f"{name}.xml: actuators must follow the joints' order; see joint {joint.name}")

@@ -13,6 +13,11 @@ from murmillo.envs.rotations import quat_mul, quat_rotate
 
 def lowest_point(character: Character, qpos: Tensor) -> Tensor:
     """Height [...] [m] of the lowest point of any geom that can touch the ground, in the pose qpos [..., nq]."""
+    return geom_heights(character, qpos).amin(-1)
+
+
+def geom_heights(character: Character, qpos: Tensor) -> Tensor:
+    """Heights [..., G] [m] of the lowest points of the bodies' G geoms, in the model's order, in the pose [..., nq]."""
     pos, quat = character.forward_kinematics(qpos)
     geoms = _geoms(character)
     quat = quat[..., geoms.body, :]
@@ -24,7 +29,7 @@ def lowest_point(character: Character, qpos: Tensor) -> Tensor:
     radius, disc, half = geoms.radius.to(qpos), geoms.disc.to(qpos), geoms.half.to(qpos)
     along = half[:, 0] * rise_x.abs() + half[:, 1] * rise_y.abs() + half[:, 2] * rise_z.abs()
     across = disc * (1.0 - rise_z.square()).clamp_min(0.0).sqrt()
-    return (centre - radius - along - across).amin(-1)
+    return centre - radius - along - across
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import Tensor
 
 from murmillo.envs.character import Character
@@ -57,13 +58,18 @@ def resample(clip: Clip, fps: float, character: Character) -> Clip:
     if count < 1:
         raise MotionError(f"clip {clip.name}: has less than two frames at {fps:g} fps; give a higher rate")
     at = np.linspace(0.0, clip.frames - 1, count + 1) if clip.loop else np.arange(count + 1) * clip.fps / fps
-    below = np.minimum(at.astype(np.int64), clip.frames - 2)
-    part = torch.from_numpy(at - below)
-    a, b = (torch.from_numpy(clip.qpos[frames]) for frames in (below, below + 1))
+    return check_clip(replace(clip, qpos=poses_at(clip, at, character), fps=fps), character)
+
+
+def poses_at(clip: Clip, frames: NDArray[np.floating], character: Character) -> NDArray[np.float64]:
+    """Poses [n, nq] at frames [n] of the clip, which may lie between two: rotations go along the shorter arc."""
+    below = np.minimum(frames.astype(np.int64), clip.frames - 2)
+    part = torch.from_numpy(frames - below)
+    a, b = (torch.from_numpy(clip.qpos[rows]) for rows in (below, below + 1))
     qpos = torch.lerp(a, b, part.unsqueeze(-1))
     for columns in [slice(3, 7), *(joint.qpos for joint in character.joints if joint.kind == "ball")]:
         qpos[:, columns] = slerp(a[:, columns], b[:, columns], part)
-    return check_clip(replace(clip, qpos=qpos.numpy(), fps=fps), character)
+    return qpos.numpy()
 
 
 def mirror(clip: Clip, character: Character) -> Clip:

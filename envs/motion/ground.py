@@ -9,8 +9,9 @@ import torch
 from numpy.typing import NDArray
 
 from murmillo.envs.character import CONTROL_DT, Character
+from murmillo.envs.geometry import geom_heights
 from murmillo.envs.motion.clip import Clip
-from murmillo.envs.rotations import quat_mul, quat_rotate
+from murmillo.envs.rotations import quat_rotate
 
 _Floats = NDArray[np.float64]
 
@@ -38,58 +39,42 @@ class Ground:
 
 def ground_of(clip: Clip, character: Character) -> Ground:
     """Kinematics of a clip's geoms and soles; the slide is per control step of 1/30 s, whatever the clip's rate."""
-    shapes = _shapes(character)
-    body_pos_w, body_quat_w = character.forward_kinematics(torch.from_numpy(clip.qpos.copy()))
-    quat_w = quat_mul(body_quat_w[:, shapes.body], torch.from_numpy(shapes.quat))
-    pos_w = body_pos_w[:, shapes.body] + quat_rotate(body_quat_w[:, shapes.body], torch.from_numpy(shapes.pos))
-    # how far each geom's own axes point up: the last row of its rotation matrix
-    up = torch.stack([quat_rotate(quat_w, axis)[..., 2] for axis in torch.eye(3, dtype=torch.float64)], dim=-1)
-    sole_w = body_pos_w[:, shapes.sole_body] + quat_rotate(
-        body_quat_w[:, shapes.sole_body], torch.from_numpy(shapes.sole)
-    )
-    points = sole_w.numpy()
-    height = points[..., 2] - shapes.sole_radius
+    soles = _soles(character)
+    qpos = torch.from_numpy(clip.qpos.copy())
+    pos_w, quat_w = character.forward_kinematics(qpos)
+    points = (pos_w[:, soles.body] + quat_rotate(quat_w[:, soles.body], torch.from_numpy(soles.point))).numpy()
+    height = points[..., 2] - soles.radius
     grounded = (height[1:] < GROUNDED) & (height[:-1] < GROUNDED)
     moved = np.linalg.norm(np.diff(points[..., :2], axis=0), axis=-1) * clip.fps * CONTROL_DT
+    model = character.model
     return Ground(
-        bodies=tuple(character.bodies[body] for body in shapes.body),
-        height=pos_w[..., 2].numpy() - _reach(shapes, up.numpy()),
-        feet=tuple(character.bodies[body] for body in shapes.sole_body),
+        bodies=tuple(character.bodies[body - 1] for body in model.geom_bodyid if body),  # body 0 is the ground
+        height=geom_heights(character, qpos).numpy(),
+        feet=tuple(character.bodies[body] for body in soles.body),
         slide=moved * grounded,
         sole_height=height,
     )
 
 
 @dataclass(frozen=True)
-class _Shapes:
-    """The G geoms of a character in their bodies' frames, and the P points of its soles."""
+class _Soles:
+    """The P points that a character's feet stand on [m]: their bodies, places there [P, 3], and balls around them."""
 
     body: NDArray[np.int64]
-    pos: _Floats
-    quat: _Floats
-    kind: NDArray[np.int64]
-    size: _Floats
-    sole_body: NDArray[np.int64]
-    sole: _Floats
-    sole_radius: _Floats
+    point: _Floats
+    radius: _Floats
 
 
 @lru_cache(maxsize=8)
-def _shapes(character: Character) -> _Shapes:
+def _soles(character: Character) -> _Soles:
     model = character.model
-    geoms = np.flatnonzero(model.geom_bodyid)  # those of the world, body 0, are the ground
-    feet = [geom for geom in geoms if character.bodies[model.geom_bodyid[geom] - 1] in character.feet]
-    soles = [_sole(model, int(geom)) for geom in feet]
+    feet = [geom for geom in range(model.ngeom) if model.body(int(model.geom_bodyid[geom])).name in character.feet]
+    soles = [_sole(model, geom) for geom in feet]
     counts = [len(points) for points, _ in soles]
-    return _Shapes(
-        body=model.geom_bodyid[geoms].astype(np.int64) - 1,
-        pos=model.geom_pos[geoms].copy(),
-        quat=model.geom_quat[geoms].copy(),
-        kind=model.geom_type[geoms].astype(np.int64),
-        size=model.geom_size[geoms].copy(),
-        sole_body=np.repeat(model.geom_bodyid[feet].astype(np.int64) - 1, counts),
-        sole=np.concatenate([points for points, _ in soles]),
-        sole_radius=np.repeat([radius for _, radius in soles], counts),
+    return _Soles(
+        body=np.repeat(model.geom_bodyid[feet].astype(np.int64) - 1, counts),
+        point=np.concatenate([points for points, _ in soles]),
+        radius=np.repeat([radius for _, radius in soles], counts),
     )
 
 
@@ -109,17 +94,3 @@ def _sole(model: mujoco.MjModel, geom: int) -> tuple[_Floats, float]:
         ends = (-1.0, 1.0) if model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_CAPSULE else (0.0,)
         points, radius = np.array([[0.0, 0.0, end * size[1]] for end in ends]), float(size[0])
     return model.geom_pos[geom] + points @ axes.T, radius
-
-
-def _reach(shapes: _Shapes, up: _Floats) -> _Floats:
-    """How far each geom reaches below its centre [F, G] [m]; `up` [F, G, 3] are the heights of its axes' tips."""
-    radius, half = shapes.size[:, 0], shapes.size[:, 1]
-    reach = np.broadcast_to(radius, up.shape[:-1]).copy()  # a sphere
-    box = shapes.kind == mujoco.mjtGeom.mjGEOM_BOX
-    capsule = shapes.kind == mujoco.mjtGeom.mjGEOM_CAPSULE
-    cylinder = shapes.kind == mujoco.mjtGeom.mjGEOM_CYLINDER
-    reach[:, box] = np.sum(np.abs(up[:, box]) * shapes.size[box], axis=-1)
-    reach[:, capsule] += half[capsule] * np.abs(up[:, capsule, 2])
-    rim = radius[cylinder] * np.hypot(up[:, cylinder, 0], up[:, cylinder, 1])
-    reach[:, cylinder] = rim + half[cylinder] * np.abs(up[:, cylinder, 2])
-    return reach

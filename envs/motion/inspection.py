@@ -106,28 +106,11 @@ def _floating(look: _Look) -> Iterator[Suspicion]:
 
 
 def _limits(look: _Look) -> Iterator[Suspicion]:
-    excess = _least_excess(look.joints, look.character)
+    excess = beyond_limits(look.joints, look.character)
     frame, column = _peak(excess)
     if (worst := excess[frame, column]) > BEYOND:
         text = f"the {look.joint(column)} is {np.degrees(worst):.0f} degrees beyond its limit"
         yield Suspicion("limits", frame, text)
-
-
-def _least_excess(joints: _Floats, character: Character) -> _Floats:
-    """How far coordinates [F, A] leave their limits [rad], of the two rotation vectors of a ball joint the nearer one.
-
-    An arm that passes behind the vertical would else seem to leap from one end of its box beyond the other.
-    """
-    other = joints.copy()
-    for joint in character.joints:
-        if joint.kind == "ball":
-            angle = np.linalg.norm(joints[:, joint.action], axis=1, keepdims=True)
-            other[:, joint.action] *= 1.0 - 2.0 * np.pi / np.maximum(angle, 1e-9)
-    excess, of_other = beyond_limits(joints, character), beyond_limits(other, character)
-    for joint in character.joints:
-        nearer = of_other[:, joint.action].max(axis=1) < excess[:, joint.action].max(axis=1)
-        excess[nearer, joint.action] = of_other[nearer, joint.action]
-    return excess
 
 
 def _speed(look: _Look) -> Iterator[Suspicion]:

@@ -1,6 +1,7 @@
 """What is measured on a clip before it is fit to learn from."""
 
 from dataclasses import dataclass
+from math import ceil
 
 import mujoco
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 
 from murmillo.envs.character import Character
 from murmillo.envs.motion.clip import Clip
+from murmillo.envs.motion.editing import poses_at
 from murmillo.envs.motion.ground import ground_of
 from murmillo.envs.motion.velocities import clip_velocities
 from murmillo.envs.rotations import quat_conj, quat_mul, quat_to_rotvec
@@ -23,8 +25,8 @@ TRACKED = 0.15  # mean joint error that counts as followed [rad]
 class Measures:
     """Of one clip: the worst slide of a standing sole [m a control step], lowest point of a body [m], excess over the
     joint limits [rad], highest joint speed [rad/s], largest change of joint velocity between frames [rad/s], share of
-    frames from which the open-loop targets are followed (NaN where that was not tried), and the distance between first
-    and last pose [rad]."""
+    frames from which the open-loop targets are followed (NaN where that was not tried), and the largest angle by which
+    a joint of the last pose differs from the first [rad]."""
 
     slide: float
     lowest: float
@@ -38,18 +40,16 @@ class Measures:
 def measure(clip: Clip, character: Character, every: int | None = 1) -> Measures:
     """Measure a clip; tracking, which simulates and so is slow, is tried from each `every`-th frame, or not at all."""
     ground = ground_of(clip, character)
-    joints = joint_coordinates(clip, character)
-    speed = np.diff(joints, axis=0) * clip.fps
-    rates = velocities(clip, character)[:, 6:]
+    rates = velocities(clip, character)[:-1, 6:]  # the last row repeats the one before
     tracked = float("nan") if every is None else float(np.mean(tracking_error(clip, character, every) < TRACKED))
     return Measures(
         slide=float(ground.slide.max()),
         lowest=float(ground.height.min()),
-        beyond_limits=float(beyond_limits(joints, character).max()),
-        speed=float(max(np.abs(rates).max(), np.abs(speed).max())),
-        jump=float(np.abs(np.diff(speed, axis=0)).max(initial=0.0)),
+        beyond_limits=float(beyond_limits(joint_coordinates(clip, character), character).max()),
+        speed=float(np.abs(rates).max()),
+        jump=float(np.abs(np.diff(rates, axis=0)).max(initial=0.0)),
         tracked=tracked,
-        closure=float(np.abs(joints[-1] - joints[0]).max()),
+        closure=float(_joint_error(clip.qpos[-1:], clip.qpos[:1], character).max()),
     )
 
 
@@ -64,36 +64,54 @@ def velocities(clip: Clip, character: Character) -> _Floats:
 
 
 def beyond_limits(joints: _Floats, character: Character) -> _Floats:
-    """How far joint coordinates [F, A] leave their box, their range or the action's range [rad]; negative inside."""
+    """How far joint coordinates [F, A] leave their box, their range or the action's range [rad]; negative inside.
+
+    Of the two rotation vectors of a ball joint, with angles a and 2 pi - a, the one nearer to its box counts: an arm
+    that passes behind the vertical would else seem to leap from one end of its box beyond the other.
+    """
     (low, high), (lowest, highest) = character.joint_limits.numpy().T, character.model.actuator_ctrlrange.T
-    return np.maximum(np.maximum(low, lowest) - joints, joints - np.minimum(high, highest))
+    low, high = np.maximum(low, lowest), np.minimum(high, highest)
+    excess = np.maximum(low - joints, joints - high)
+    for joint in character.joints:
+        if joint.kind == "ball":
+            columns = joint.action
+            angle = np.linalg.norm(joints[:, columns], axis=1, keepdims=True)
+            other = joints[:, columns] * (1.0 - 2.0 * np.pi / np.maximum(angle, 1e-9))
+            of_other = np.maximum(low[columns] - other, other - high[columns])
+            nearer = of_other.max(axis=1) < excess[:, columns].max(axis=1)
+            excess[nearer, columns] = of_other[nearer]
+    return excess
 
 
 def tracking_error(clip: Clip, character: Character, every: int = 1) -> _Floats:
     """Mean joint error [rad] over half a second of following the clip's next poses as PD targets, from sampled frames.
 
-    Each start has the clip's pose and velocity; the error of a joint is the angle between its rotation and the clip's.
+    Each start has the clip's pose and velocity; targets are a control step apart, whatever the clip's rate. The error
+    of a joint is the angle between its rotation and the clip's.
     """
     model = character.model
     data = mujoco.MjData(model)
-    targets, qvel = joint_coordinates(clip, character), velocities(clip, character)
+    qvel = velocities(clip, character)
+    step = clip.fps * character.control_dt  # [frames]
     errors = []
-    for start in range(0, clip.frames - 1, every):
+    for start in range(0, max(1, clip.frames - ceil(step - 1e-6)), every):
         mujoco.mj_resetData(model, data)
         data.qpos, data.qvel = clip.qpos[start], qvel[start]
-        end = min(start + HORIZON, clip.frames - 1)
+        steps = min(HORIZON, max(1, int((clip.frames - 1 - start) / step + 1e-6)))
+        ahead = np.minimum(start + step * np.arange(1, steps + 1), clip.frames - 1)
+        wished = poses_at(clip, ahead, character)
         reached = []
-        for target in targets[start + 1 : end + 1]:
+        for target in character.joint_coordinates(torch.from_numpy(wished)).numpy():
             data.ctrl = target
             mujoco.mj_step(model, data, character.substeps)
             reached.append(data.qpos.copy())
-        errors.append(_joint_error(np.stack(reached), clip.qpos[start + 1 : end + 1], character).mean())
+        errors.append(_joint_error(np.stack(reached), wished, character).mean())
     return np.array(errors)
 
 
 def _joint_error(qpos: _Floats, wished: _Floats, character: Character) -> _Floats:
     """Angle between poses [F, nq] at each joint [F, J] [rad]."""
-    a, b = torch.from_numpy(qpos), torch.tensor(wished)
+    a, b = torch.tensor(qpos), torch.tensor(wished)
     errors = [
         quat_to_rotvec(quat_mul(quat_conj(a[:, joint.qpos]), b[:, joint.qpos])).norm(dim=-1)
         if joint.kind == "ball"

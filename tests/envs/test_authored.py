@@ -1,5 +1,7 @@
 """The built-in clips: what each must measure to be worth learning from, and that the generator still makes them."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import torch
@@ -142,13 +144,38 @@ def test_centre_of_mass_obeys_the_cart_on_a_table() -> None:
     np.testing.assert_allclose(path[[0, 1, -2, -1], 0], [0.0, 0.0, 0.3, 0.3])
 
 
-def test_generator_makes_the_shipped_clip() -> None:
+def test_packs_are_what_the_generator_lists() -> None:
+    pytest.importorskip("mink", reason="the generator needs the motion extra: pip install murmillo[motion]")
+    from murmillo.envs.motion.authored.skills import SKILLS
+    from murmillo.envs.motion.authored.styles import GAITS as STYLES
+
+    assert [skill().label for skill in SKILLS] == list(CLIPS)
+    assert [gait().label for gait in STYLES] == list(GAITS)
+
+
+@pytest.mark.parametrize("name", ["shield_bash", "kick", "dodge_left", "guard", "fall_front"])
+def test_generator_makes_the_shipped_clip(name: str) -> None:
+    """A blow on planted feet, a foot led through the air, a flight, a loop and a fall."""
     pytest.importorskip("mink", reason="the generator needs the motion extra: pip install murmillo[motion]")
     from murmillo.envs.motion.authored.generate import generate
-    from murmillo.envs.motion.authored.skills.shield import shield_bash
+    from murmillo.envs.motion.authored.skills import SKILLS
 
-    made = generate(shield_bash(), CHARACTER)
-    np.testing.assert_allclose(made.qpos, CLIPS["shield_bash"].qpos, atol=2e-3)
+    made = generate(next(skill for skill in SKILLS if skill.__name__ == name)(), CHARACTER)
+    np.testing.assert_allclose(made.qpos, CLIPS[name].qpos, atol=1e-4)
+    assert made.loop is CLIPS[name].loop
+
+
+def test_command_writes_a_pack(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture) -> None:
+    pytest.importorskip("mink", reason="the generator needs the motion extra: pip install murmillo[motion]")
+    from murmillo.envs.motion.authored import __main__ as command
+    from murmillo.envs.motion.authored.styles import penguin
+
+    monkeypatch.setitem(command.PACKS, "humanoid", (penguin,))
+    command.main(["--character", "humanoid", "--out", str(tmp_path)])
+    (made,) = load_clips(str(tmp_path / "humanoid"), HUMANOID)
+    np.testing.assert_allclose(made.qpos, GAITS["penguin"].qpos, atol=1e-6)
+    assert "1 clips, 2.1 s" in capsys.readouterr().out
+    assert [path.name for path in tmp_path.iterdir()] == ["humanoid"]
 
 
 @pytest.mark.parametrize("name", ["walk", "limp"])

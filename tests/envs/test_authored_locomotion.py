@@ -135,3 +135,58 @@ def test_free_fall_is_asked_of_the_body_and_of_the_ground() -> None:
     pressure[43:, 0] = 0.5
     path = over(pressure, 0.9, 30.0, load)
     np.testing.assert_allclose(np.diff(path, n=2, axis=0)[39:45] * 900.0, 0.0, atol=0.1)
+
+
+def test_a_foot_leaves_when_the_other_has_landed_or_flies_before() -> None:
+    """Footfalls at 1.0, 1.5 and 2.0 s: both stand for 0.1 s after the first, the body flies for 0.2 s to the second."""
+    pytest.importorskip("mink", reason="the generator needs the motion extra: pip install murmillo[motion]")
+    from murmillo.envs.motion.authored.body import Pose
+    from murmillo.envs.motion.authored.feet import Place
+    from murmillo.envs.motion.authored.gait import RUNNING, Carriage, Footfall, keys_between, steps_between
+
+    falls = [
+        Footfall("right", 1.0, Place(0.5, -0.1), -0.1),
+        Footfall("left", 1.5, Place(1.0, 0.1), 0.2),
+        Footfall("right", 2.0, Place(1.5, -0.1), swing=RUNNING),
+    ]
+    steps = steps_between(falls, start=0.6)
+    assert [(step.foot, step.end) for step in steps] == [("right", 1.0), ("left", 1.5), ("right", 2.0)]
+    assert [step.start for step in steps] == pytest.approx([0.6, 1.1, 1.3])
+    when, x, y, _, _ = np.array(steps[2].flow).T
+    np.testing.assert_allclose(when, 1.3 + 0.7 * np.array([phase for phase, *_ in RUNNING.legs]))
+    assert np.all(np.diff(x) > 0.0)
+    np.testing.assert_allclose(y, -0.1)
+    keys = keys_between(Carriage(Pose(), rise=0.03), falls)
+    assert [key.time for key in keys] == pytest.approx([1.0, 1.25, 1.5, 1.75, 2.0])
+    assert [key.pose.height - Pose().height for key in keys] == pytest.approx([0.0, 0.03, 0.0, 0.03, 0.0])
+
+
+def test_a_running_foot_flows_onto_the_ground() -> None:
+    """It swings through its places, meets the ground at the speed of touchdown, and rolls flat where it landed."""
+    pytest.importorskip("scipy", reason="the generator needs the motion extra: pip install murmillo[motion]")
+    from murmillo.envs.motion.authored.feet import SOLE, TOUCHDOWN, Place, Step, foot_path
+
+    through = (0.8, 0.5, 0.1, 0.4, 0.0)
+    step = Step("left", 0.5, 1.0, Place(1.0, 0.1), push=40.0, strike=0.0, flow=(through,))
+    time = np.linspace(0.0, 1.2, 12001)
+    path = foot_path("left", Place(0.0, 0.1), [step], time)
+    np.testing.assert_allclose(path.ankle[8000], through[1:4], atol=1e-6)
+    landing = np.diff(path.ankle[9997:9999], axis=0)[0] * 10000.0
+    np.testing.assert_allclose(landing, [TOUCHDOWN[0], 0.0, TOUCHDOWN[1]], atol=0.02)  # [m/s]
+    np.testing.assert_allclose(path.ankle[[0, -1]], [[0.0, 0.1, SOLE], [1.0, 0.1, SOLE]], atol=1e-9)
+    assert (path.planted == ((time <= 0.5) | (time >= 1.0))).all()
+
+
+def test_pelvis_sinks_where_a_leg_would_be_overstretched() -> None:
+    pytest.importorskip("mink", reason="the generator needs the motion extra: pip install murmillo[motion]")
+    from scipy.spatial.transform import Rotation
+
+    from murmillo.envs.motion.authored.feet import foot_path
+    from murmillo.envs.motion.authored.take import HIP_OFFSET, REACH, STANCE, _overreach
+
+    feet = {side: foot_path(side, place, [], np.arange(31) / 30.0) for side, place in STANCE.items()}
+    pelvis, level = np.tile([0.0, 0.0, 0.95], (31, 1)), Rotation.identity(31)
+    sunk = pelvis - _overreach(pelvis, level, feet)[:, None] * [0.0, 0.0, 1.0]
+    lengths = [np.linalg.norm(path.ankle - sunk - [0.0, HIP_OFFSET[side], 0.0], axis=1) for side, path in feet.items()]
+    np.testing.assert_allclose(np.max(lengths, axis=0), REACH, atol=1e-6)
+    assert not _overreach(pelvis - [0.0, 0.0, 0.2], level, feet).any()

@@ -147,6 +147,16 @@ def test_a_model_that_breaks_a_convention_is_refused():
         load_character(edit=rotate)
 
 
+def test_a_joint_of_an_unknown_kind_is_refused():
+    def add_a_crate(spec: mujoco.MjSpec) -> None:
+        crate = spec.worldbody.add_body(name="crate", pos=[2, 0, 0.2])
+        crate.add_geom(size=[0.2, 0.2, 0.2])
+        crate.add_freejoint(name="crate")
+
+    with pytest.raises(SuiteError, match="joint crate is neither a ball nor a hinge"):
+        load_character(edit=add_a_crate)
+
+
 def test_the_humanoid_is_the_murmillo_with_empty_hands(character):
     """Its 15 bodies weigh the same; action 0 is the middle of each range, 1 a whole range away (AdaptNet's mapping)."""
     humanoid = load_character("humanoid")

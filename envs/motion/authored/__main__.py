@@ -67,4 +67,5 @@ if __name__ == "__main__":
     try:
         main()
     except SuiteError as error:
-        sys.exit(str(error))
+        print(error, file=sys.stderr)
+        sys.exit(2)

@@ -5,8 +5,8 @@ over the toes' edge. In swing the leg follows a table of joint angles, bent so t
 where, and as fast as, the planted foot does. Legs are solved in closed form, so that a stride closes exactly.
 """
 
-from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 import torch
@@ -78,10 +78,6 @@ class LegCycle:
     push: float = 52.0
     swing: tuple[tuple[float, float, float, float], ...] = WALK_SWING
     lift: float = 0.03
-
-    def but(self, **changes: Any) -> "LegCycle":
-        """This leg with some of its words changed."""
-        return replace(self, **changes)
 
 
 @dataclass(frozen=True)

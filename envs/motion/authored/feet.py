@@ -1,4 +1,4 @@
-"""Where the feet are: planted until a step says otherwise, rolling over the toes, swinging on minimum-jerk arcs."""
+"""Where the feet are: planted until a step says otherwise, rolling over the toes, swinging to the next place."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -31,7 +31,8 @@ class Step:
     """One foot leaves the ground at `start` and lands at `end` [s].
 
     `lift` is the clearance at mid-swing [m]. Before leaving, the heel rises by `push` [deg] over the toe edge in
-    `push_time`; the foot lands on the heel with the toes up by `strike` [deg] and is flat `flat_time` later.
+    `push_time`; the foot lands on the heel with the toes up by `strike` [deg], on the
+    toes where it is negative, and is flat `flat_time` later.
     `via` are places of the foot in the air, (time, x, y, height above the ground, yaw, toes-down pitch [deg]): a kick.
     `flow` are places of the ankle, (time, x, y, z, toes-down pitch [deg]), that it swings through without pause: a run.
     """

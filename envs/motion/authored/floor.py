@@ -34,15 +34,12 @@ def perform_on_floor(take: FloorTake, character: Character) -> np.ndarray:
     time = np.arange(round(key_times[-1] * FPS) + 1) / FPS
     keys = _solved(tumbler, [pose for _, pose in take.keys])
 
-    poses = np.stack([key.qpos for key in keys])
-    wished = _between(character, poses, key_times, time)
-    qpos = _follow(tumbler, wished, keys, key_times, time)
-    coordinates = character.joint_coordinates(torch.from_numpy(qpos)).numpy()
-    root = np.column_stack([qpos[:, :3], _rotvec(qpos[:, 3:7])])
-    smoothed = smooth(np.column_stack([coordinates, root]), SMOOTH, FPS)
-    smoothed[[0, -1]] = np.column_stack([coordinates, root])[[0, -1]]
-    wished = _joined(character, smoothed[:, :-6], smoothed[:, -6:])
-    return _follow(tumbler, wished, keys, key_times, time)
+    poses = _parted(character, np.stack([key.qpos for key in keys]))
+    wished = _joined(character, through_keys(key_times, poses, time))
+    values = _parted(character, _follow(tumbler, wished, keys, key_times, time))
+    smoothed = smooth(values, SMOOTH, FPS)
+    smoothed[[0, -1]] = values[[0, -1]]
+    return _follow(tumbler, _joined(character, smoothed), keys, key_times, time)
 
 
 @dataclass(frozen=True)
@@ -72,21 +69,17 @@ def _solve(tumbler: Tumbler, pose: Low | Stand, start: np.ndarray | None = None)
     return _Key(qpos, tumbler.places(points), {side: tumbler.sole(side) for side in soles})
 
 
-def _between(character: Character, poses: np.ndarray, key_times: np.ndarray, time: np.ndarray) -> np.ndarray:
-    """Solved keys [K, nq] to every frame [F, nq]."""
-    coordinates = character.joint_coordinates(torch.from_numpy(poses)).numpy()
-    root = np.column_stack([poses[:, :3], _rotvec(poses[:, 3:7])])
-    return _joined(character, through_keys(key_times, coordinates, time), through_keys(key_times, root, time))
+def _parted(character: Character, qpos: np.ndarray) -> np.ndarray:
+    """Poses [F, nq] as joint coordinates, position and rotation vector of the root [F, A + 6]."""
+    coordinates = character.joint_coordinates(torch.from_numpy(qpos)).numpy()
+    return np.column_stack([coordinates, qpos[:, :3], Rotation.from_quat(qpos[:, 3:7], scalar_first=True).as_rotvec()])
 
 
-def _joined(character: Character, coordinates: np.ndarray, root: np.ndarray) -> np.ndarray:
-    """Joint coordinates [F, A] and root position and rotation vector [F, 6] as poses [F, nq]."""
-    rotation = Rotation.from_rotvec(root[:, 3:]).as_quat(scalar_first=True)
-    return character.pose(*(torch.from_numpy(part) for part in (coordinates, root[:, :3].copy(), rotation))).numpy()
-
-
-def _rotvec(quat: np.ndarray) -> np.ndarray:
-    return Rotation.from_quat(quat, scalar_first=True).as_rotvec()
+def _joined(character: Character, values: np.ndarray) -> np.ndarray:
+    """Inverse of `_parted`: poses [F, nq]."""
+    rotation = Rotation.from_rotvec(values[:, -3:]).as_quat(scalar_first=True)
+    parts = (values[:, :-6].copy(), values[:, -6:-3].copy(), rotation)
+    return character.pose(*(torch.from_numpy(part) for part in parts)).numpy()
 
 
 def _follow(

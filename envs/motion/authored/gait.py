@@ -10,11 +10,11 @@ bends to 90 degrees and the thigh rises to 40 (Novacheck 1998).
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from murmillo.envs.motion.authored.body import Pose
 from murmillo.envs.motion.authored.feet import Place, Step
+from murmillo.envs.motion.authored.leg import hanging
 from murmillo.envs.motion.authored.take import Key
 
 DOUBLE_SUPPORT = 0.10  # [s], of a stride of about 1 s
@@ -96,7 +96,7 @@ def steps_between(falls: Sequence[Footfall], start: float, height: float = 0.79)
         flow = []
         for phase, thigh, knee, pitch in swing.legs:
             time = left + phase * (fall.time - left)
-            x, z = _ankle(thigh, knee)
+            x, z = hanging(THIGH, SHIN, thigh, knee)
             flow.append((time, float(way(time)) + x, fall.place.y, height + z, pitch))
         steps.append(
             Step(
@@ -124,12 +124,6 @@ def keys_between(carriage: Carriage, falls: Sequence[Footfall]) -> list[Key]:
             keys.append(Key(0.5 * (before.time + fall.time), passing))
         keys.append(Key(fall.time, footfall))
     return keys
-
-
-def _ankle(thigh: float, knee: float) -> tuple[float, float]:
-    """Where the ankle hangs from the hip, ahead and up [m], of the thigh's rise and the knee's bend [deg]."""
-    rise, shin = np.radians([thigh, thigh - knee])
-    return THIGH * np.sin(rise) + SHIN * np.sin(shin), -THIGH * np.cos(rise) - SHIN * np.cos(shin)
 
 
 def _step_poses(carriage: Carriage, foot: str) -> tuple[Pose, Pose]:

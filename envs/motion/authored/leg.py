@@ -24,10 +24,7 @@ class Leg:
 
     def hang(self, lean: np.ndarray, knee: np.ndarray) -> np.ndarray:
         """Ankle from the hip [F, 2] (ahead, up) [m] of a thigh that leans ahead and a knee that is bent [F] [deg]."""
-        thigh, shin = np.radians(lean), np.radians(lean - knee)
-        ahead = self.thigh * np.sin(thigh) + self.shin * np.sin(shin)
-        up = -self.thigh * np.cos(thigh) - self.shin * np.cos(shin)
-        return np.stack([ahead, up], axis=-1)
+        return hanging(self.thigh, self.shin, lean, knee)
 
     def solve(
         self, pelvis: Rotation, hip_w: np.ndarray, ankle_w: np.ndarray, foot: Rotation, knee_yaw: np.ndarray
@@ -50,6 +47,19 @@ class Leg:
         thigh = _frame(line, left) * local.inv()
         shin = thigh * Rotation.from_euler("y", knee[:, None])
         return pelvis.inv() * thigh, knee, shin.inv() * foot
+
+
+def hanging(thigh: float, shin: float, lean: np.ndarray | float, knee: np.ndarray | float) -> np.ndarray:
+    """Ankle from the hip [..., 2] (ahead, up) of a thigh and a shin of these lengths [m].
+
+    Args:
+        lean: of the thigh, ahead of the vertical [...] [deg].
+        knee: how far it is bent [...] [deg].
+    """
+    upper, lower = np.radians(lean), np.radians(lean - knee)
+    ahead = thigh * np.sin(upper) + shin * np.sin(lower)
+    up = -thigh * np.cos(upper) - shin * np.cos(lower)
+    return np.stack([ahead, up], axis=-1)
 
 
 def _frame(first: np.ndarray, second: np.ndarray) -> Rotation:

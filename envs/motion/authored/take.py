@@ -9,7 +9,7 @@ from scipy.ndimage import maximum_filter1d
 from scipy.spatial.transform import Rotation
 
 from murmillo.envs.character import Character
-from murmillo.envs.motion.authored.body import Pose, Puppet
+from murmillo.envs.motion.authored.body import FootTargets, Pose, Puppet
 from murmillo.envs.motion.authored.feet import FootPath, Place, Step, foot_path
 from murmillo.envs.motion.authored.timing import FPS, centre_of_mass, free_fall, load_of, ramp, smooth, through_keys
 
@@ -143,5 +143,5 @@ def _follow(
     )
 
 
-def _at(feet: dict[str, FootPath], frame: int) -> dict[str, tuple[np.ndarray, Rotation]]:
+def _at(feet: dict[str, FootPath], frame: int) -> FootTargets:
     return {side: (path.ankle[frame], path.rotation[frame]) for side, path in feet.items()}

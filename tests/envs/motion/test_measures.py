@@ -10,9 +10,10 @@ import torch
 
 from murmillo.envs.character import Character, load_character
 from murmillo.envs.motion import Clip, load_clips
+from murmillo.envs.motion.editing import resample
 from murmillo.envs.motion.ground import ground_of
 from murmillo.envs.motion.inspection import inspect
-from murmillo.envs.motion.measures import measure
+from murmillo.envs.motion.measures import measure, tracking_error
 
 CHARACTER = load_character("sword_shield")
 CLIPS = {clip.name: clip for clip in load_clips("builtin", CHARACTER)}
@@ -64,6 +65,57 @@ def test_slide_is_per_control_step_whatever_the_rate() -> None:
 
     for fps in (30.0, 120.0):
         assert measure(drift(fps), CHARACTER, every=None).slide == pytest.approx(0.02, abs=1e-3)
+
+
+def _still(frames: int = 31) -> Clip:
+    """Guard's first pose, held."""
+    return replace(GUARD, qpos=np.repeat(GUARD.qpos[:1], frames, axis=0))
+
+
+def test_joints_are_measured_in_their_own_units() -> None:
+    """An elbow that begins to turn by 0.1 rad a frame; a neck 30 degrees beyond the 50 that it has."""
+
+    def bend(qpos: np.ndarray) -> None:
+        qpos[:, columns("left_elbow")] -= 0.1 * np.clip(np.arange(31) - 10, 0, 8)[:, None]
+
+    bent = measure(changed(_still(), bend), CHARACTER, every=None)
+    assert (bent.speed, bent.jump, bent.closure) == pytest.approx((3.0, 3.0, 0.8))
+    assert measure(_still(), CHARACTER, every=None).beyond_limits < 0.0
+    turned = measure(changed(_still(), _turn(30, "neck", 80.0, 0)), CHARACTER, every=None)
+    assert turned.beyond_limits == pytest.approx(np.radians(30.0))
+
+
+def test_what_no_action_can_ask_for_is_beyond_the_limits() -> None:
+    """An elbow that may bend to -2.79 rad, and targets that end at -1."""
+
+    def narrow(spec: mujoco.MjSpec) -> None:
+        spec.actuator("left_elbow").ctrlrange = [-1.0, 0.5]
+
+    bent = changed(_still(), _set(slice(None), columns("left_elbow"), -1.5))
+    assert measure(bent, load_character(edit=narrow), every=None).beyond_limits == pytest.approx(0.5)
+
+
+def test_an_arm_that_passes_behind_the_vertical_does_not_leap() -> None:
+    """From -170 to -190 degrees, which is +170 as a rotation vector of the least angle, in even steps of one degree."""
+
+    def raise_arm(qpos: np.ndarray) -> None:
+        for frame in range(31):
+            _turn(frame, "right_shoulder", -170.0 - min(frame, 20), 1)(qpos)
+
+    raised = measure(changed(_still(), raise_arm), CHARACTER, every=None)
+    assert raised.speed == pytest.approx(np.radians(30.0))
+    assert raised.jump == pytest.approx(np.radians(30.0))  # as it stops
+    assert raised.closure == pytest.approx(np.radians(20.0))
+    assert raised.beyond_limits == pytest.approx(np.radians(10.0))
+
+
+@pytest.mark.parametrize("fps", [25.0, 60.0, 120.0])
+def test_targets_follow_each_other_at_control_rate_whatever_the_clips(fps: float) -> None:
+    slash = CLIPS["slash_down"]
+    every = round(fps / 5.0)
+    at_control_rate = tracking_error(slash, CHARACTER, every=6)
+    errors = tracking_error(resample(slash, fps, CHARACTER), CHARACTER, every)
+    np.testing.assert_allclose(errors[:10], at_control_rate[:10], atol=0.01)  # [rad]
 
 
 def test_tracking_is_left_out_where_nobody_asks() -> None:
@@ -166,6 +218,8 @@ def test_what_pd_targets_cannot_follow_is_told() -> None:
 def test_a_clip_of_two_frames_can_be_inspected() -> None:
     assert measure(replace(GUARD, qpos=GUARD.qpos[:2]), CHARACTER, every=None).jump == 0.0
     assert checks(replace(GUARD, qpos=GUARD.qpos[:2])) == {}
+    brief = replace(GUARD, qpos=GUARD.qpos[:2], fps=120.0)  # shorter than a control step
+    assert checks(brief, tracking=True) == {}
 
 
 def test_inspection_changes_nothing() -> None:

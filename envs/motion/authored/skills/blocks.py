@@ -140,7 +140,7 @@ def block_crouched() -> Take:
 
 
 def _block(label: str, ready: Pose, struck: Pose) -> Take:
-    """Into the way of the blow in 0.4 s, which falls at 0.88 s; the knees and the trunk take it."""
+    """In the way of the blow by 0.46 s; it falls at 0.88 s, and the knees and the trunk take it."""
     return Take(
         label,
         [
