@@ -88,6 +88,7 @@ class HumanoidVectorEnv(VectorEnv):
         self._ended = torch.zeros(num_envs, dtype=torch.bool)
         self._fell = torch.zeros(num_envs, dtype=torch.bool)
         self._history = torch.zeros(num_envs, config.window, state_dim(self.character))
+        self._push_w: Tensor | None = None
         self._screen: FrameRenderer | Window | None = None
 
     @property
@@ -207,6 +208,20 @@ class HumanoidVectorEnv(VectorEnv):
         self._fallen.touch_is_fall = not allowed
         self._starts.on_ground = allowed
 
+    def push(self, force_w: Tensor, body: str | None = None) -> None:
+        """Push the character from outside, throughout the next step and no longer; `state_dict` does not keep it.
+
+        Args:
+            force_w: [N, 3] [N] at the body's origin, beside any residual force there.
+            body: its name; None is the root.
+        """
+        if body is not None and body not in self.character.bodies:
+            raise SuiteError(f"body={body}: no such body; there are: {', '.join(self.character.bodies)}")
+        if force_w.shape != (self.num_envs, 3):
+            raise SuiteError(f"force_w of shape {tuple(force_w.shape)}: needs {(self.num_envs, 3)}")
+        self._push_w = torch.zeros(self.num_envs, len(self.character.bodies), 3, dtype=torch.float64)
+        self._push_w[:, 0 if body is None else self.character.bodies.index(body)] = force_w.double()
+
     def observation(self) -> dict[str, np.ndarray]:
         """The current observation, which a `set_skill` since the last step has changed."""
         return self._observation()
@@ -281,7 +296,9 @@ class HumanoidVectorEnv(VectorEnv):
         action = action.double()
         joints, extra = action.split([self.character.action_dim, expected[1] - self.character.action_dim], dim=-1)
         force = self._residual(extra, self.state) if self._residual else None
-        self.physics.step(self.character.targets(joints), force)
+        pushed, self._push_w = self._push_w, None
+        outer = force if pushed is None else pushed if force is None else force + pushed
+        self.physics.step(self.character.targets(joints), outer)
         self._steps += 1
         self._free_steps = (self._free_steps - 1).clamp_min(0)
         self._history = torch.cat((self._history[:, 1:], self._frame().unsqueeze(1)), dim=1)
