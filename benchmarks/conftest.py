@@ -24,7 +24,7 @@ def record(benchmark: Any) -> Callable[[str, float, str], None]:
     """`record(name, rate, note)` keeps a figure for the table and for pytest-benchmark's JSON."""
 
     def keep(name: str, rate: float, note: str = "") -> None:
-        benchmark.extra_info["per_second"] = rate
+        benchmark.extra_info[name] = rate
         RESULTS.append((name, rate, note))
 
     return keep

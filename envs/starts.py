@@ -62,6 +62,8 @@ class StartSampler:
         for name in ("recovery", "fallen", "reference"):
             if not 0.0 <= getattr(config, name) <= 1.0:
                 raise SuiteError(f"starts.{name}={getattr(config, name)}: needs a share between 0 and 1")
+        if config.fallen_states < 1:
+            raise SuiteError(f"starts.fallen_states={config.fallen_states}: needs at least 1")
         self.config = config
         self._character, self._library = character, library
         self._pool_size = min(config.fallen_states, max(16, num_envs))
