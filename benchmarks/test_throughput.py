@@ -42,6 +42,7 @@ def test_training_iteration(benchmark, record, agent, budget):
     samples = runner.env.num_envs * runner.config.horizon
 
     def iteration() -> None:
+        runner._direct()
         rollout = runner._collect()
         runner._reward(rollout)
         runner._advantage(rollout)

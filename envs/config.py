@@ -24,6 +24,8 @@ class EnvConfig:
         autoreset: gymnasium's autoreset mode of the vector environment.
         threads: CPU threads of the physics; 0 takes every CPU.
         camera, width, height: of the frames of `render_mode="rgb_array"`.
+        fall: what ends an episode.
+        starts: how one begins.
     """
 
     motions: str = "builtin"
@@ -53,8 +55,11 @@ def check_config(config: EnvConfig, render_mode: str | None, modes: list[str]) -
     for name, least in (("window", 1), ("episode_steps", 1), ("residual_force", 0), ("width", 1), ("height", 1)):
         if getattr(config, name) < least:
             raise SuiteError(f"{name}={getattr(config, name)}: needs at least {least}")
-    known = [mode.name.lower() for mode in AutoresetMode]
-    if config.autoreset not in known:
-        raise SuiteError(f"autoreset={config.autoreset}: no such mode; there are: {', '.join(known)}")
-    if render_mode is not None and render_mode not in modes:
-        raise SuiteError(f"render_mode={render_mode}: no such mode; there are: {', '.join(modes)}")
+    for name, value, known in (
+        ("autoreset", config.autoreset, [mode.name.lower() for mode in AutoresetMode]),
+        ("residual_reward", config.residual_reward, ["sum", "mean"]),
+        ("fall.contact", config.fall.contact, ["ground", "any"]),
+        ("render_mode", render_mode, [None, *modes]),
+    ):
+        if value not in known:
+            raise SuiteError(f"{name}={value}: no such choice; there are: {', '.join(filter(None, known))}")

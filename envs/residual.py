@@ -1,4 +1,4 @@
-"""Skeletal residual forces: help from outside at the joints, in units of a scale (C.ASE section 4.2)."""
+"""Skeletal residual forces: help from outside at the joints, in units of a scale (C.ASE section 3.1)."""
 
 from typing import Literal
 

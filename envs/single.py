@@ -1,5 +1,6 @@
 """One world as a plain gymnasium environment."""
 
+import dataclasses
 from typing import Any, ClassVar, Literal
 
 import gymnasium
@@ -21,8 +22,7 @@ class HumanoidEnv(gymnasium.Env):
         task: Task | None = None,
         render_mode: Literal["rgb_array", "human"] | None = None,
     ) -> None:
-        config = config or EnvConfig(threads=1)
-        config.autoreset = "disabled"
+        config = dataclasses.replace(config or EnvConfig(threads=1), autoreset="disabled")
         self.vector = HumanoidVectorEnv(1, config, task, render_mode)
         self.render_mode = render_mode
         self.observation_space = self.vector.single_observation_space

@@ -66,6 +66,8 @@ class StartSampler:
         for name in ("recovery", "fallen", "reference"):
             if not 0.0 <= getattr(config, name) <= 1.0:
                 raise SuiteError(f"starts.{name}={getattr(config, name)}: needs a share between 0 and 1")
+        if config.fallen_states < 1:
+            raise SuiteError(f"starts.fallen_states={config.fallen_states}: needs at least 1")
         self.config = config
         self._character = character
         self._references = _ReferenceStock(character, library, min(num_envs, _MOST_AHEAD), window)

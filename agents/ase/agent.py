@@ -17,7 +17,7 @@ from murmillo.agents.common.ppo import PPO, ActorCritic, Minibatch
 from murmillo.agents.common.replay import Replay
 from murmillo.agents.common.rollout import Rollout
 from murmillo.agents.common.skill_discovery import diversity_loss, encoder_loss, skill_reward
-from murmillo.agents.common.training import Means, adam, adam_state, load_adam_state, load_module, named
+from murmillo.agents.common.training import Means, adam, load_parts, minimise, named, state_of
 
 
 class ASE:
@@ -55,6 +55,14 @@ class ASE:
             ([*self.discriminator.parameters(), *self.encoder.parameters()], config.discriminator.learning_rate)
         )
         self.replay = Replay(config.discriminator.replay_size, config.discriminator.replay_keep)
+        self._parts = {
+            "ppo": self.ppo,
+            "discriminator": self.discriminator,
+            "encoder": self.encoder,
+            "optimizer": self.optimizer,
+            "replay": self.replay,
+            "latents": self.latents,
+        }
 
     def act(self, obs: Obs, *, deterministic: bool = False) -> Step:
         """Lines 9-11: one step under the sequence of latents; the mean action if deterministic."""
@@ -103,9 +111,7 @@ class ASE:
             if config.skill_discovery:
                 mu_q = self.encoder(loss.agent_inputs, loss.agent_features)
                 losses["encoder"] = encoder_loss(mu_q, latents[rows], config.kappa)
-            self.optimizer.zero_grad()
-            torch.stack(list(losses.values())).sum().backward()
-            self.optimizer.step()
+            minimise(self.optimizer, losses)
             means.add({**losses, **loss.scores})
 
         # line 29: V and pi
@@ -141,19 +147,7 @@ class ASE:
         return {"diversity": config.diversity_weight * loss}
 
     def state_dict(self) -> dict[str, Any]:
-        return {
-            "ppo": self.ppo.state_dict(),
-            "discriminator": self.discriminator.state_dict(),
-            "encoder": self.encoder.state_dict(),
-            "optimizer": adam_state(self.optimizer),
-            "replay": self.replay.state_dict(),
-            "latents": self.latents.state_dict(),
-        }
+        return state_of(self._parts)
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
-        self.ppo.load_state_dict(state["ppo"])
-        load_module(self.discriminator, state["discriminator"], "discriminator")
-        load_module(self.encoder, state["encoder"], "encoder")
-        load_adam_state(self.optimizer, state["optimizer"])
-        self.replay.load_state_dict(state["replay"])
-        self.latents.load_state_dict(state["latents"])
+        load_parts(self._parts, state)

@@ -18,7 +18,7 @@ from murmillo.agents.common.latents import sample_sphere
 from murmillo.agents.common.ppo import PPO, ActorCritic, Minibatch
 from murmillo.agents.common.replay import Replay
 from murmillo.agents.common.rollout import Rollout
-from murmillo.agents.common.training import Means, adam, adam_state, load_adam_state, load_module, named
+from murmillo.agents.common.training import Means, adam, load_parts, minimise, named, state_of
 
 
 class CALM:
@@ -54,6 +54,14 @@ class CALM:
         self.motions = MotionSequence(
             env.num_envs, config.latent_dim, config.latent_steps, generator, self._draw_motions, self.encoder
         )
+        self._parts = {
+            "ppo": self.ppo,
+            "encoder": self.encoder,
+            "discriminator": self.discriminator,
+            "optimizer": self.optimizer,
+            "replay": self.replay,
+            "latents": self.motions,
+        }
 
     @torch.no_grad()
     def encode(self, window: Tensor, mask: Tensor | None = None) -> Tensor:
@@ -73,6 +81,9 @@ class CALM:
         self.motions.hold(latent)
 
     def act(self, obs: Obs, *, deterministic: bool = False) -> Step:
+        """One step under the encodings of the motions that the worlds follow; the mean action if deterministic."""
+        if deterministic:
+            self.motions.forget()  # nothing is learnt from a mean action: a player keeps no more than it follows
         latent, motion = self.motions.step()
         action, log_prob = self.model.act(obs["state"], latent, self.generator, deterministic)
         mask = self.motions.mask(motion)
@@ -107,9 +118,7 @@ class CALM:
             demonstration = self._encoded_demonstration(pool)
             negative = self._negative(demonstration)
             loss = discriminator_loss(self.discriminator, agent, replay, demonstration, negative)
-            self.optimizer.zero_grad()
-            torch.stack(list(loss.parts.values())).sum().backward()
-            self.optimizer.step()
+            minimise(self.optimizer, loss.parts)
             means.add({**loss.parts, **loss.scores})
         means.add({"agent_mismatched_score": self._mismatched_score(agent)})
 
@@ -184,19 +193,7 @@ class CALM:
         self.encoder.normalizer.update(drawn["window"], None if mask is None else mask[:, None])
 
     def state_dict(self) -> dict[str, Any]:
-        return {
-            "ppo": self.ppo.state_dict(),
-            "encoder": self.encoder.state_dict(),
-            "discriminator": self.discriminator.state_dict(),
-            "optimizer": adam_state(self.optimizer),
-            "replay": self.replay.state_dict(),
-            "latents": self.motions.state_dict(),
-        }
+        return state_of(self._parts)
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
-        self.ppo.load_state_dict(state["ppo"])
-        load_module(self.encoder, state["encoder"], "encoder")
-        load_module(self.discriminator, state["discriminator"], "discriminator")
-        load_adam_state(self.optimizer, state["optimizer"])
-        self.replay.load_state_dict(state["replay"])
-        self.motions.load_state_dict(state["latents"])
+        load_parts(self._parts, state)

@@ -36,7 +36,7 @@ class MotionSequence:
             encode: gives their latents [n, Z].
         """
         self._draw, self._encode = draw, encode
-        # all motions that were followed since `encode_again`; a rollout speaks of them by their rows
+        # all motions that were followed since `forget`; a rollout speaks of them by their rows
         self._window = torch.zeros(0)
         self._masks: Tensor | None = None
         self._number = torch.zeros(num_envs, dtype=torch.int64)
@@ -55,19 +55,23 @@ class MotionSequence:
         self._latents.hold(latent)
 
     def of(self, numbers: Tensor) -> Windows:
-        """The motions [n, F, D] of these numbers [n], which `encode_again` gives out anew."""
+        """The motions [n, F, D] of these numbers [n], which `forget` and `encode_again` give out anew."""
         return select(Windows(self._window, mask=self._masks), numbers)
 
     def mask(self, numbers: Tensor) -> Tensor | None:
         """What these motions [n] leave out, [n, D] bool; None where no motion leaves anything out."""
         return None if self._masks is None else self._masks[numbers]
 
+    def forget(self) -> None:
+        """Forget the motions that no world follows any more; the numbers given out so far are void."""
+        if len(self._window) > len(self._number):
+            self._keep(self.of(self._number))
+
     @torch.no_grad()
     def encode_again(self) -> None:
         """Forget the motions that no world follows any more, and encode the others anew."""
-        followed = self.of(self._number)
-        self._keep(followed)
-        self._latents.latent.copy_(self._encode(followed))
+        self.forget()
+        self._latents.latent.copy_(self._encode(self.of(self._number)))
 
     @torch.no_grad()
     def _begin(self, env_ids: Tensor) -> Tensor:

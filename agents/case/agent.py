@@ -20,7 +20,7 @@ from murmillo.agents.common.ppo import PPO, ActorCritic, Minibatch
 from murmillo.agents.common.replay import Replay
 from murmillo.agents.common.rollout import Rollout
 from murmillo.agents.common.skill_discovery import diversity_loss, encoder_loss, skill_reward
-from murmillo.agents.common.training import Means, adam, adam_state, load_adam_state, load_module, named
+from murmillo.agents.common.training import Means, adam, load_module, load_parts, minimise, named, state_of
 
 
 class CASE:
@@ -67,6 +67,15 @@ class CASE:
         self.focal = FocalSampling(labels, config)
         self.masks = FeatureMasks(demonstrations, labels)
         self.iterations = 0
+        self._parts = {
+            "ppo": self.ppo,
+            "discriminator": self.discriminator,
+            "encoder": self.encoder,
+            "optimizer": self.optimizer,
+            "replay": self.replay,
+            "latents": self.latents,
+            "focal": self.focal,
+        }
         # known before the first update, lest that judges windows in raw units and every later one in other units
         self._observe(self._draw_demonstrations())
 
@@ -122,9 +131,7 @@ class CASE:
             if config.skill_discovery:
                 mu_q = self.encoder(loss.agent_inputs, labels[rows])
                 losses["encoder"] = encoder_loss(mu_q, latents[rows], config.kappa)
-            self.optimizer.zero_grad()
-            torch.stack(list(losses.values())).sum().backward()
-            self.optimizer.step()
+            minimise(self.optimizer, losses)
             means.add({**losses, **loss.scores})
 
         ppo = self.ppo.update(
@@ -211,27 +218,11 @@ class CASE:
         return {"diversity": config.diversity_weight * loss}
 
     def state_dict(self) -> dict[str, Any]:
-        return {
-            "ppo": self.ppo.state_dict(),
-            "label": self.label.state_dict(),
-            "discriminator": self.discriminator.state_dict(),
-            "encoder": self.encoder.state_dict(),
-            "optimizer": adam_state(self.optimizer),
-            "replay": self.replay.state_dict(),
-            "latents": self.latents.state_dict(),
-            "focal": self.focal.state_dict(),
-            "iterations": self.iterations,
-        }
+        return {"label": self.label.state_dict(), **state_of(self._parts), "iterations": self.iterations}
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         load_module(self.label, state["label"], "label embedding")
-        self.ppo.load_state_dict(state["ppo"])
-        load_module(self.discriminator, state["discriminator"], "discriminator")
-        load_module(self.encoder, state["encoder"], "encoder")
-        load_adam_state(self.optimizer, state["optimizer"])
-        self.replay.load_state_dict(state["replay"])
-        self.latents.load_state_dict(state["latents"])
-        self.focal.load_state_dict(state["focal"])
+        load_parts(self._parts, state)
         self.iterations = state["iterations"]
 
 

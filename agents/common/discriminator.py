@@ -11,6 +11,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
+from murmillo.agents.common.errors import AgentError
 from murmillo.agents.common.networks import Dropout, linear, mlp
 from murmillo.agents.common.normalizer import RunningNormalizer
 
@@ -43,6 +44,10 @@ class DiscriminatorConfig:
     replay_size: int = 200_000
     replay_keep: float = 0.01
     dropout: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.updates < 1:
+            raise AgentError(f"agent.discriminator.updates={self.updates}: needs at least 1")
 
 
 class Windows(NamedTuple):

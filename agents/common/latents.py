@@ -76,5 +76,10 @@ class LatentSequence:
         return {"latent": self.latent, "steps_left": self.steps_left}
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
+        if state["latent"].shape != self.latent.shape:
+            raise AgentError(
+                f"the checkpoint's latents [worlds, Z] are {list(state['latent'].shape)}, the run's "
+                f"{list(self.latent.shape)}; go on with as many worlds as there were"
+            )
         self.latent.copy_(state["latent"])
         self.steps_left.copy_(state["steps_left"])

@@ -19,11 +19,12 @@ class FeatureMasks:
         Args:
             demonstrations: their "mask" `[n, D]`, if any, says what is left out.
             skills: K, where windows are compared with demonstrations of their own skill; None where with any.
-            draws: demonstrations to learn the masks from, of each skill; 16, or 1,024 of all.
+            draws: demonstrations to learn the masks from, of each skill; 256, or 1,024 of all.
         """
-        draws = draws or (1024 if skills is None else 16)
+        draws = draws or (1024 if skills is None else 256)
         skill = None if skills is None else torch.arange(skills).repeat_interleave(draws)
-        mask = demonstrations((skills or 1) * draws, torch.Generator().manual_seed(0), skill).get("mask")
+        # a mask is the same for all frames of a clip: windows of one are enough, and cheap
+        mask = demonstrations((skills or 1) * draws, torch.Generator().manual_seed(0), skill, frames=1).get("mask")
         self._masks = None if mask is None or not mask.any() else mask.unflatten(0, (-1, draws))
 
     def draw(self, n: int, generator: torch.Generator, skill: Tensor | None = None) -> Tensor | None:

@@ -22,7 +22,7 @@ from murmillo.agents.common.losses import (
 from murmillo.agents.common.networks import GaussianPolicy, linear, mlp
 from murmillo.agents.common.normalizer import RunningNormalizer
 from murmillo.agents.common.rollout import Rollout
-from murmillo.agents.common.training import Means, adam, adam_state, load_adam_state, load_module
+from murmillo.agents.common.training import Means, adam, adam_state, load_adam_state, load_module, minimise
 
 Minibatch = dict[str, Tensor]
 """Rows of a rollout by name, `[B, ...]`; "state" is normalised."""
@@ -175,9 +175,7 @@ class PPO:
             means.add({**losses, **scores})
             if config.target_kl is not None and scores["kl"] > config.target_kl:
                 break
-            self.optimizer.zero_grad()
-            torch.stack(list(losses.values())).sum().backward()
-            self.optimizer.step()
+            minimise(self.optimizer, losses)
         self.model.state_normalizer.update(rollout["state"])
         self.model.return_normalizer.update(rollout["return"])
         return means.result()

@@ -15,10 +15,14 @@ from murmillo.agents.common import checkpoint
 from murmillo.agents.common.advantages import gae
 from murmillo.agents.common.episodes import EpisodeStatistics
 from murmillo.agents.common.errors import AgentError
+from murmillo.agents.common.failures import WatchConfig
 from murmillo.agents.common.interface import Agent, Directing
 from murmillo.agents.common.logger import Logger
 from murmillo.agents.common.rollout import Rollout, tensors, true_next_obs
-from murmillo.agents.common.watch import Watch, WatchConfig
+from murmillo.agents.common.watch import Watch
+
+_SAVED = ("meta", "agent", "generator", "samples", "iteration", "watch")
+"""What every checkpoint of a run holds; "env", "obs" and "episodes" only where the environment has a state."""
 
 
 @dataclass
@@ -240,9 +244,12 @@ class Runner:
         """Go on from a checkpoint, in a fresh runner of the same config.
 
         Raises:
-            AgentError: it is damaged, or its `meta` is another's.
+            AgentError: it is damaged, incomplete, or its `meta` is another's.
         """
         state = checkpoint.load(folder)
+        missing = [name for name in _SAVED if name not in state]
+        if missing:
+            raise AgentError(f"{folder} has no {', '.join(missing)}: it is no run of this version; begin a new one")
         checkpoint.check_compatible(state["meta"], self.meta)
         self.agent.load_state_dict(state["agent"])
         self.samples, self.iteration = state["samples"], state["iteration"]

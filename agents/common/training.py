@@ -1,4 +1,4 @@
-"""What every update needs: Adam with a state that fits into a checkpoint, checked weights, means to log."""
+"""What every agent needs to learn and to be kept: Adam, states that fit into a checkpoint, means to log."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any
@@ -12,6 +12,13 @@ from murmillo.agents.common.errors import AgentError
 def adam(*groups: tuple[Iterable[nn.Parameter], float]) -> torch.optim.Adam:
     """One Adam over (parameters, learning rate) groups, each stepping as if it had its own."""
     return torch.optim.Adam([{"params": list(params), "lr": rate} for params, rate in groups], fused=True)
+
+
+def minimise(optimizer: torch.optim.Optimizer, losses: Mapping[str, Tensor]) -> None:
+    """One step down the sum of named losses."""
+    optimizer.zero_grad()
+    torch.stack(list(losses.values())).sum().backward()
+    optimizer.step()
 
 
 def adam_state(optimizer: torch.optim.Adam) -> dict[str, Any]:
@@ -37,6 +44,28 @@ def load_module(module: nn.Module, state: Mapping[str, Tensor], name: str) -> No
                 f"{list(value.shape)} here"
             )
     module.load_state_dict(state)
+
+
+def state_of(parts: Mapping[str, Any]) -> dict[str, Any]:
+    """The states of an agent's parts by name: networks, optimisers, and what else has a `state_dict`."""
+    return {
+        name: adam_state(part) if isinstance(part, torch.optim.Adam) else part.state_dict()
+        for name, part in parts.items()
+    }
+
+
+def load_parts(parts: Mapping[str, Any], state: Mapping[str, Any]) -> None:
+    """Load what `state_of` gave; an AgentError in one line where it does not fit."""
+    missing = sorted(parts.keys() - state.keys())
+    if missing:
+        raise AgentError(f"the checkpoint has no {', '.join(missing)}: it is another agent's or of another version")
+    for name, part in parts.items():
+        if isinstance(part, nn.Module):
+            load_module(part, state[name], name)
+        elif isinstance(part, torch.optim.Adam):
+            load_adam_state(part, state[name])
+        else:
+            part.load_state_dict(state[name])
 
 
 class Means:

@@ -45,7 +45,9 @@ class CpuPhysics:
 
     def step(self, ctrl: Tensor, body_force_w: Tensor | None = None) -> None:
         self._ctrl[:] = ctrl.numpy()
-        if body_force_w is not None:
+        if body_force_w is None:
+            self._xfrc[:] = 0.0
+        else:
             arm = self.state.body_pos_w - self.state.body_com_w
             self._xfrc[:, 1:, :3] = body_force_w.numpy()
             self._xfrc[:, 1:, 3:] = torch.linalg.cross(arm, body_force_w.double()).numpy()

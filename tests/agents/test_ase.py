@@ -1,3 +1,4 @@
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -7,7 +8,7 @@ from murmillo.agents.common.errors import AgentError
 from murmillo.agents.common.latents import sample_sphere
 from murmillo.agents.common.ppo import PPOConfig
 from murmillo.agents.common.warm_start import WarmStartConfig, warm_start
-from tests.agents.toy import PointMass, make_ase, make_runner, small_ase
+from tests.agents.toy import PointMass, make_ase, make_case, make_runner, small_ase
 
 
 def train(folder: Path, **changes: object) -> list[dict[str, float]]:
@@ -50,6 +51,19 @@ def test_ablations(tmp_path: Path) -> None:
     runner.on_iteration = [stats.append]
     runner.run()
     assert not {"reward/skill", "discriminator/encoder", "ppo/diversity"} & stats[0].keys()
+
+
+@pytest.mark.parametrize("make", [make_ase, make_case])
+def test_diversity_is_asked_of_two_different_latents(make: Callable, generator: torch.Generator) -> None:
+    agent = make(PointMass(3), generator, diversity_weight=1.0)
+    with torch.no_grad():
+        agent.model.policy.head.weight *= 30
+    batch = {"state": torch.randn(64, 4, generator=generator), "label": torch.zeros(64, dtype=torch.int64)}
+    batch["latent"] = sample_sphere(64, 4, generator)
+    condition = batch["latent"] if make is make_ase else agent.condition(batch["latent"], batch["label"])
+    mean = agent.model.policy(batch["state"], condition)
+    loss = agent._diversity(batch, mean)["diversity"].item()
+    assert loss != pytest.approx(1.0, abs=0.05)  # what the same latent twice, and so the same action, would give
 
 
 @pytest.mark.parametrize("shared", [True, False])

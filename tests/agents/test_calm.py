@@ -7,63 +7,29 @@ import pytest
 import torch
 from torch import Tensor
 
-from murmillo.agents.calm.agent import CALM
-from murmillo.agents.calm.config import CALMConfig, EncoderConfig
+from murmillo.agents.calm.config import EncoderConfig
 from murmillo.agents.calm.losses import alignment_loss, uniformity_loss
-from murmillo.agents.common.discriminator import DiscriminatorConfig
 from murmillo.agents.common.errors import AgentError
 from murmillo.agents.common.latents import interpolate, sample_sphere
 from murmillo.agents.common.ppo import PPOConfig
 from murmillo.agents.common.rollout import tensors
 from murmillo.agents.common.runner import Runner, RunnerConfig
-from tests.agents.toy import SPEED, PointMass, equal
-
-FRAMES = 6
+from tests.agents.toy import DT, MOTION_FRAMES, SPEED, PointMass, equal, make_calm, make_runner, small_calm
 
 
-def small_calm(**changes: Any) -> CALMConfig:
-    ppo = PPOConfig(
-        hidden=(32, 32),
-        style_hidden=(),
-        std=0.1,
-        policy_learning_rate=1e-3,
-        value_learning_rate=3e-3,
-        epochs=4,
-        minibatch=128,
-    )
-    discriminator = DiscriminatorConfig(
-        hidden=(32, 32), learning_rate=1e-3, minibatch=64, updates=8, gradient_penalty=1.0, replay_size=1000
-    )
-    encoder = EncoderConfig(frames=FRAMES, hidden=(32, 32), shift=2, minibatch=64, pool=256)
-    fields = {
-        "latent_dim": 4,
-        "latent_steps": (4, 16),
-        "window": 3,
-        "discriminator_style_hidden": (),
-        "ppo": ppo,
-        "discriminator": discriminator,
-        "encoder": encoder,
-    }
-    return CALMConfig(**{**fields, **changes})
-
-
-def make_runner(folder: Path, *, num_envs: int = 32, agent: dict | None = None, **config: Any) -> Runner:
-    generator = torch.Generator().manual_seed(0)
-    env = PointMass(num_envs)
-    settings = {"samples": 32 * 8 * 4, "horizon": 8, "lam": 0.9, "gamma": 0.9, "reward_weights": {"style": 1.0}}
-    calm = CALM(env, env.demonstrations, small_calm(**(agent or {})), generator)
-    return Runner(env, calm, RunnerConfig(**{**settings, **config}), generator, folder)
+def calm_runner(folder: Path, **settings: Any) -> Runner:
+    return make_runner(folder, make=make_calm, **{"reward_weights": {"style": 1.0}, **settings})
 
 
 def straight(angles: Tensor) -> Tensor:
-    """Motions [n, FRAMES, 4] straight ahead from the origin, in these directions [n] [rad]."""
+    """Motions [n, MOTION_FRAMES, 4] straight ahead from the origin, in these directions [n] [rad]."""
     velocity = SPEED * torch.stack([angles.cos(), angles.sin()], 1)
-    position = 0.1 * torch.arange(FRAMES)[None, :, None] * velocity[:, None]
+    position = DT * torch.arange(MOTION_FRAMES)[None, :, None] * velocity[:, None]
     return torch.cat([position, velocity[:, None].expand_as(position)], 2)
 
 
 def test_the_policy_follows_the_encoded_motion(tmp_path: Path) -> None:
-    runner = make_runner(tmp_path, num_envs=64, samples=64 * 8 * 60, agent={"negatives": "shuffled"})
+    runner = calm_runner(tmp_path, num_envs=64, samples=64 * 8 * 60, agent={"negatives": "shuffled"})
     calm: Any = runner.agent
     angles = torch.arange(8) * torch.pi / 4
 
@@ -81,12 +47,12 @@ def test_the_policy_follows_the_encoded_motion(tmp_path: Path) -> None:
 
 def test_encodings_have_unit_length_and_depend_on_every_frame_that_is_seen(generator: torch.Generator) -> None:
     env = PointMass(3)
-    encoder = EncoderConfig(frames=FRAMES, stride=2, hidden=(16,), shift=0, minibatch=8, pool=64)
-    calm = CALM(env, env.demonstrations, small_calm(encoder=encoder), generator)
-    motion = torch.randn(5, FRAMES, 4, generator=generator)
+    encoder = EncoderConfig(frames=MOTION_FRAMES, stride=2, hidden=(16,), shift=0, minibatch=8, pool=64)
+    calm = make_calm(env, generator, encoder=encoder)
+    motion = torch.randn(5, MOTION_FRAMES, 4, generator=generator)
     z = calm.encode(motion)
     torch.testing.assert_close(z.norm(dim=1), torch.ones(5))
-    for frame in range(FRAMES):
+    for frame in range(MOTION_FRAMES):
         changed = motion.clone()
         changed[:, frame] += 1.0
         assert torch.equal(calm.encode(changed), z) == (frame % 2 == 0)  # seen are 5, 3 and 1
@@ -94,24 +60,24 @@ def test_encodings_have_unit_length_and_depend_on_every_frame_that_is_seen(gener
 
 def test_the_policys_loss_trains_the_encoder_and_the_discriminators_does_not(tmp_path: Path) -> None:
     plain = EncoderConfig(
-        frames=FRAMES, hidden=(16,), shift=0, alignment_weight=0.0, uniformity_weight=0.0, minibatch=8, pool=64
+        frames=MOTION_FRAMES, hidden=(16,), shift=0, alignment_weight=0.0, uniformity_weight=0.0, minibatch=8, pool=64
     )
     still = PPOConfig(hidden=(8,), style_hidden=(), policy_learning_rate=0.0, epochs=1, minibatch=64)
     moving = PPOConfig(hidden=(8,), style_hidden=(), policy_learning_rate=1e-3, epochs=1, minibatch=64)
     for ppo, moves in ((still, False), (moving, True)):
-        runner = make_runner(tmp_path / str(moves), samples=1, agent={"encoder": plain, "ppo": ppo})
+        runner = calm_runner(tmp_path / str(moves), samples=1, agent={"encoder": plain, "ppo": ppo})
         calm: Any = runner.agent
         before = [parameter.clone() for parameter in calm.encoder.parameters()]
         judge = [parameter.clone() for parameter in calm.discriminator.parameters()]
         runner.run()
         assert moves != all(torch.equal(a, b) for a, b in zip(before, calm.encoder.parameters(), strict=True))
-        assert not all(torch.equal(a, b) for a, b in zip(judge, calm.discriminator.parameters(), strict=True))
+        assert not any(torch.equal(a, b) for a, b in zip(judge, calm.discriminator.parameters(), strict=True))
 
 
 def test_log_probabilities_belong_to_the_encoder_of_the_iteration(tmp_path: Path) -> None:
     """At the first minibatch of an update the policy is the one that acted, also for motions begun long before."""
     one_step = PPOConfig(hidden=(8,), style_hidden=(), policy_learning_rate=1e-2, epochs=1, minibatch=256)
-    runner = make_runner(tmp_path, samples=32 * 8 * 5, agent={"ppo": one_step, "latent_steps": (50, 60)})
+    runner = calm_runner(tmp_path, samples=32 * 8 * 5, agent={"ppo": one_step, "latent_steps": (50, 60)})
     history: list[dict[str, float]] = []
     runner.on_iteration = [history.append]
     runner.run()
@@ -120,7 +86,7 @@ def test_log_probabilities_belong_to_the_encoder_of_the_iteration(tmp_path: Path
 
 @pytest.mark.parametrize("negatives", ["sphere", "shuffled", "none"])
 def test_negatives_are_a_part_of_the_discriminators_loss_or_not(tmp_path: Path, negatives: str) -> None:
-    runner = make_runner(tmp_path, samples=1, agent={"negatives": negatives})
+    runner = calm_runner(tmp_path, samples=1, agent={"negatives": negatives})
     history: list[dict[str, float]] = []
     runner.on_iteration = [history.append]
     runner.run()
@@ -142,7 +108,7 @@ def test_masked_features_of_a_motion_reach_neither_encoder_nor_discriminator(tmp
         generator = torch.Generator().manual_seed(0)
         env = Masked(16)
         env.noise = noise
-        calm = CALM(env, env.demonstrations, small_calm(), generator)
+        calm = make_calm(env, generator)
         Runner(
             env, calm, RunnerConfig(samples=16 * 8 * 3, horizon=8, reward_weights={"style": 1.0}), generator, tmp_path
         ).run()
@@ -150,11 +116,95 @@ def test_masked_features_of_a_motion_reach_neither_encoder_nor_discriminator(tmp
     assert equal(*states)
 
 
+def test_a_world_leaves_out_what_its_own_motion_leaves_out(generator: torch.Generator) -> None:
+    env = PointMass(20)
+    whole = env.demonstrations
+
+    def masked_to_the_right(*args: Any, **kwargs: Any) -> dict[str, Tensor]:
+        drawn = whole(*args, **kwargs)
+        mask = torch.zeros(len(drawn["skill"]), 4, dtype=torch.bool)
+        mask[:, 1] = drawn["window"][:, -1, 2] > 0
+        return drawn | {"mask": mask}
+
+    env.demonstrations = masked_to_the_right  # type: ignore[method-assign]
+    calm = make_calm(env, generator, latent_steps=(1, 3))
+    obs = tensors(env.reset(seed=0)[0])
+    for _ in range(10):
+        extras = calm.act(obs).extras
+        followed = calm.motions.of(extras["motion"])
+        torch.testing.assert_close(calm.encoder(followed).detach(), extras["latent"])
+        assert torch.equal(extras["mask"][:, 1], followed.window[:, -1, 2] > 0)
+    assert 0 < extras["mask"][:, 1].sum() < 20
+
+
+def test_true_windows_lie_in_the_motion_whose_encoding_they_are_judged_by(generator: torch.Generator) -> None:
+    env = PointMass(2)
+    encoder = EncoderConfig(frames=MOTION_FRAMES, hidden=(16,), shift=2, minibatch=64, pool=64)
+    calm = make_calm(env, generator, encoder=encoder)
+    pool = calm._draw_motions(64, MOTION_FRAMES + 2)
+    drawn = calm._encoded_demonstration(pool)
+    encodings = calm.encode(pool.window[:, 2:])
+    assert drawn.condition is not None
+    beginnings = set()
+    for window, z in zip(drawn.window, drawn.condition, strict=True):
+        motion = pool.window[(encodings - z).norm(dim=1).argmin(), 2:]
+        torch.testing.assert_close(z, calm.encode(motion[None])[0])
+        (first,) = [i for i in range(MOTION_FRAMES - 2) if torch.equal(motion[i : i + 3], window)]
+        beginnings.add(first)
+    assert beginnings == set(range(MOTION_FRAMES - 2))
+
+
+def test_a_negative_is_a_true_window_under_anothers_latent(generator: torch.Generator) -> None:
+    calm = make_calm(PointMass(2), generator, negatives="shuffled")
+    true = calm._encoded_demonstration(calm._draw_motions(64, MOTION_FRAMES + 2))
+    negative = calm._negative(true)
+    assert negative is not None
+    assert true.condition is not None
+    assert negative.condition is not None
+    assert torch.equal(negative.window, true.window)
+    assert (negative.condition != true.condition).any(1).float().mean() > 0.9
+    assert torch.equal(negative.condition.sort(0).values, true.condition.sort(0).values)
+    calm.config.negatives = "sphere"
+    anywhere = calm._negative(true)
+    assert anywhere is not None
+    assert anywhere.condition is not None
+    torch.testing.assert_close(anywhere.condition.norm(dim=1), torch.ones(64))
+    assert (anywhere.condition.sort(0).values != true.condition.sort(0).values).all()
+
+
+def test_structure_pulls_neighbours_together_and_all_apart(tmp_path: Path) -> None:
+    runner = calm_runner(tmp_path, samples=1)
+    history: list[dict[str, float]] = []
+    runner.on_iteration = [history.append]
+    runner.run()
+    assert history[0]["ppo/alignment"] > 0 > history[0]["ppo/uniformity"]
+
+
+def test_the_mismatched_score_is_of_the_same_windows_under_others_latents(generator: torch.Generator) -> None:
+    calm = make_calm(PointMass(2), generator, negatives="shuffled")
+    right = calm._encoded_demonstration(calm._draw_motions(64, MOTION_FRAMES + 2))
+    wrong = calm._negative(right)
+    assert wrong is not None
+    score = calm._mismatched_score(right)
+    torch.testing.assert_close(score, calm.discriminator.logits(*wrong).sigmoid().mean())
+    assert score != calm.discriminator.logits(*right).sigmoid().mean()
+
+
+def test_a_player_remembers_no_more_than_it_follows(generator: torch.Generator) -> None:
+    env = PointMass(4)
+    calm = make_calm(env, generator, latent_steps=(1, 1))
+    obs = tensors(env.reset(seed=0)[0])
+    numbers = [calm.act(obs, deterministic=True).extras["motion"].max() for _ in range(20)]
+    assert max(numbers) < 2 * 4
+    before = calm.motions.of(torch.arange(4)).window
+    assert len(before) == 4
+
+
 def test_resumed_training_is_the_same_bit_for_bit(tmp_path: Path) -> None:
-    whole = make_runner(tmp_path / "whole", samples=32 * 8 * 6)
+    whole = calm_runner(tmp_path / "whole", samples=32 * 8 * 6)
     whole.run()
-    make_runner(tmp_path / "half", samples=32 * 8 * 3).run()
-    resumed = make_runner(tmp_path / "half", samples=32 * 8 * 6)
+    calm_runner(tmp_path / "half", samples=32 * 8 * 3).run()
+    resumed = calm_runner(tmp_path / "half", samples=32 * 8 * 6)
     resumed.load(tmp_path / "half")
     resumed.run()
     assert equal(whole.agent.state_dict(), resumed.agent.state_dict())
@@ -162,7 +212,7 @@ def test_resumed_training_is_the_same_bit_for_bit(tmp_path: Path) -> None:
 
 def test_a_world_keeps_its_motion_for_the_asked_time(generator: torch.Generator) -> None:
     env = PointMass(4)
-    calm = CALM(env, env.demonstrations, small_calm(latent_steps=(3, 3)), generator)
+    calm = make_calm(env, generator, latent_steps=(3, 3))
     obs = tensors(env.reset(seed=0)[0])
     motions = torch.stack([calm.act(obs).extras["motion"] for _ in range(9)])
     changes = (motions[1:] != motions[:-1]).any(1).tolist()
@@ -171,7 +221,7 @@ def test_a_world_keeps_its_motion_for_the_asked_time(generator: torch.Generator)
 
 def test_follows_what_it_is_told_until_reset(generator: torch.Generator) -> None:
     env = PointMass(4)
-    calm = CALM(env, env.demonstrations, small_calm(latent_steps=(1, 1)), generator)
+    calm = make_calm(env, generator, latent_steps=(1, 1))
     obs = tensors(env.reset(seed=0)[0])
     told = calm.encode(straight(torch.zeros(1)))[0]
     calm.follow(told)

@@ -111,6 +111,32 @@ def test_curriculum_and_focal_sampling_reach_the_environment(tmp_path: Path) -> 
     assert make_case(PointMass(3), torch.Generator(), focal="none").directions() == {}
 
 
+def test_demonstrations_are_drawn_by_the_shares_of_their_skills(generator: torch.Generator) -> None:
+    agent = make_case(PointMass(3, skills=SKILLS), generator)
+    agent.focal.probability = torch.tensor([0.0, 0.9, 0.1])
+    drawn = agent._draw_demonstrations()
+    assert drawn.condition is not None
+    assert drawn.condition.bincount(minlength=SKILLS)[1] > 0.75 * len(drawn.condition)
+    assert not (drawn.condition == 0).any()
+
+
+def test_scores_of_the_heads_by_hand(generator: torch.Generator) -> None:
+    agent = make_case(PointMass(3, skills=SKILLS), generator)
+    window, label = torch.randn(5, 3, 4, generator=generator), torch.tensor([0, 1, 2, 0, 1])
+    each = torch.stack([agent.discriminator.logits(window, torch.full((5,), c)) for c in range(SKILLS)], 1).sigmoid()
+    scores = agent._heads(agent._agent_windows(window, label))
+    commanded = label[:, None] == torch.arange(SKILLS)
+    torch.testing.assert_close(scores["right"], each[commanded])
+    torch.testing.assert_close(scores["other"], each[~commanded].view(5, SKILLS - 1).mean(1))
+
+
+def test_the_encoder_is_told_the_label(generator: torch.Generator) -> None:
+    agent = make_case(PointMass(3, skills=SKILLS), generator)
+    mu = agent.encoder(torch.ones(SKILLS, 12), torch.arange(SKILLS))
+    torch.testing.assert_close(mu.norm(dim=1), torch.ones(SKILLS))
+    assert ((mu[1:] - mu[:1]).norm(dim=1) > 0.01).all()
+
+
 def test_an_environment_that_cannot_be_directed_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delattr(PointMass, "set_skill_weights")
     with pytest.raises(AgentError, match="set_skill_weights"):

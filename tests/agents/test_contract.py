@@ -9,18 +9,12 @@ from typing import Any
 import pytest
 import torch
 
-from murmillo.agents.calm.agent import CALM
 from murmillo.agents.common import checkpoint
+from murmillo.agents.common.errors import AgentError
 from murmillo.agents.common.interface import Agent
 from murmillo.agents.common.rollout import Rollout, tensors, true_next_obs
 from murmillo.agents.common.runner import Runner
-from tests.agents.test_calm import small_calm
-from tests.agents.toy import PointMass, equal, make_ase, make_case, make_runner
-
-
-def make_calm(env: PointMass, generator: torch.Generator, **changes: Any) -> CALM:
-    return CALM(env, env.demonstrations, small_calm(**changes), generator)
-
+from tests.agents.toy import PointMass, equal, make_ase, make_calm, make_case, make_runner, small_ase
 
 Maker = Callable[..., Agent]
 AGENTS: dict[str, Maker] = {"ase": make_ase, "calm": make_calm, "case": make_case}
@@ -124,13 +118,32 @@ def test_an_update_moves_the_policy_and_reports_finite_numbers(
     make: Maker, skills: int, num_envs: int, generator: torch.Generator
 ) -> None:
     env = PointMass(num_envs, skills=skills)
-    ppo = dataclasses.replace(small_calm().ppo, minibatch=min(128, 4 * num_envs))  # the last of an epoch is smaller
+    ppo = dataclasses.replace(small_ase().ppo, minibatch=min(128, 4 * num_envs))  # the last of an epoch is smaller
     agent = make(env, generator, ppo=ppo)
     rollout = collected(agent, env)
     before = values(agent, env, rollout)
     stats = agent.update(rollout)
     assert all(isinstance(value, float) and torch.tensor(value).isfinite() for value in stats.values())
     assert not torch.equal(before, values(agent, env, rollout))
+
+
+def test_the_discriminator_remembers_earlier_iterations(make: Maker, generator: torch.Generator) -> None:
+    env = PointMass(15)
+    agent = make(env, generator, discriminator=small_ase().discriminator)
+    first, second = (agent.update(collected(agent, env)) for _ in range(2))
+    assert first["discriminator/replay"] == pytest.approx(first["discriminator/agent"])  # nothing to remember yet
+    assert second["discriminator/replay"] != pytest.approx(second["discriminator/agent"], rel=1e-3)
+
+
+def test_the_discriminators_scale_is_that_of_clips_and_agent(make: Maker, generator: torch.Generator) -> None:
+    """From the clips before the first judgement, from both after each update."""
+    env = PointMass(15)
+    agent: Any = make(env, generator)
+    clips = agent.config.discriminator.minibatch * env.window
+    normalizer = agent.discriminator.normalizer
+    assert normalizer.count == clips
+    agent.update(collected(agent, env))
+    assert normalizer.count == 2 * clips + HORIZON * 15
 
 
 def test_state_survives_a_checkpoint_and_goes_on_alike(
@@ -148,6 +161,15 @@ def test_state_survives_a_checkpoint_and_goes_on_alike(
     assert stats == other.update(collected(other, env))
     obs = tensors(env.reset(seed=1)[0])
     assert torch.equal(agent.act(obs).action, other.act(obs).action)
+
+
+def test_a_state_that_lacks_a_part_is_refused_in_one_line(make: Maker, generator: torch.Generator) -> None:
+    agent = make(PointMass(3), generator)
+    state = agent.state_dict()
+    del state["optimizer"], state["latents"]
+    with pytest.raises(AgentError, match="the checkpoint has no latents, optimizer") as error:
+        agent.load_state_dict(state)
+    assert "\n" not in str(error.value)
 
 
 def test_n_and_n_more_iterations_are_2n_bit_for_bit(make: Maker, tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ from murmillo.agents.common.discriminator import (
     gradient_penalty,
     style_reward,
 )
+from murmillo.agents.common.errors import AgentError
 
 
 def make(
@@ -27,6 +28,11 @@ def test_gradient_penalty_of_a_linear_and_a_quadratic_function() -> None:
     assert gradient_penalty(x @ weight, x).item() == pytest.approx(14.0)  # ||w||^2 everywhere
     y = torch.tensor([[1.0, 2.0], [0.0, 3.0]], requires_grad=True)
     assert gradient_penalty(y.square().sum(1), y).item() == pytest.approx((4 * 5 + 4 * 9) / 2)  # E ||2 y||^2
+
+
+def test_no_steps_an_iteration_are_refused() -> None:
+    with pytest.raises(AgentError, match=r"agent\.discriminator\.updates=0: needs at least 1"):
+        DiscriminatorConfig(updates=0)
 
 
 def test_gradient_penalty_can_be_differentiated() -> None:

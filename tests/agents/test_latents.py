@@ -44,6 +44,12 @@ def test_returned_latents_are_not_overwritten_later(generator: torch.Generator) 
     assert torch.equal(first, copy)
 
 
+def test_latents_of_another_number_of_worlds_are_refused(generator: torch.Generator) -> None:
+    state = LatentSequence(3, 4, generator).state_dict()
+    with pytest.raises(AgentError, match=r"\[3, 4\], the run's \[5, 4\]"):
+        LatentSequence(5, 4, generator).load_state_dict(state)
+
+
 def test_impossible_durations_are_refused(generator: torch.Generator) -> None:
     with pytest.raises(AgentError, match="latent_steps"):
         LatentSequence(1, 4, generator, min_steps=0)

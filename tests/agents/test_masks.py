@@ -11,7 +11,7 @@ from murmillo.agents.common.discriminator import Discriminator, DiscriminatorCon
 from murmillo.agents.common.masks import FeatureMasks
 from murmillo.agents.common.normalizer import RunningNormalizer
 from murmillo.agents.common.runner import Runner, RunnerConfig
-from tests.agents.toy import PointMass, make_ase, make_case
+from tests.agents.toy import PointMass, make_ase, make_calm, make_case
 
 LEFT_OUT = 1
 """The feature of the toy's state, the second of the position, that masked clips say nothing of."""
@@ -90,6 +90,31 @@ def test_masks_of_a_label_are_those_of_its_clips(generator: torch.Generator) -> 
     assert torch.equal(drawn[:, LEFT_OUT], label == 0)
 
 
+def test_case_leaves_out_of_its_own_windows_what_the_clips_of_the_label_do(generator: torch.Generator) -> None:
+    env = PointMass(4, skills=3)
+    env.demonstrations = Masked(env, 0.0)  # type: ignore[method-assign]
+    label = torch.arange(30) % 3
+    mask = make_case(env, generator)._agent_windows(torch.zeros(30, 3, 4), label).mask
+    assert mask is not None
+    assert torch.equal(mask[:, LEFT_OUT], label == 0)
+
+
+def test_a_mask_that_few_clips_of_a_label_have_is_not_missed(generator: torch.Generator) -> None:
+    env = PointMass(1, skills=2)
+
+    def one_in_twenty(
+        n: int, generator: torch.Generator, skill: Tensor | None = None, frames: int | None = None
+    ) -> dict[str, Tensor]:
+        mask = torch.zeros(n, 4, dtype=torch.bool)
+        mask[:, LEFT_OUT] = torch.rand(n, generator=generator) < 0.05
+        return {**env.demonstrations(n, generator, skill, frames), "mask": mask}
+
+    drawn = FeatureMasks(one_in_twenty, skills=2).draw(20_000, generator, torch.arange(20_000) % 2)
+    assert drawn is not None
+    share = drawn[:, LEFT_OUT].unflatten(0, (-1, 2)).float().mean(0)
+    assert share.tolist() == pytest.approx([0.05, 0.05], abs=0.04)
+
+
 def test_where_nothing_is_left_out_nothing_is_drawn(generator: torch.Generator) -> None:
     env = PointMass(1, skills=2)
 
@@ -121,7 +146,9 @@ def test_what_clips_made_up_changes_nothing_in_training(make: Callable, skills: 
         assert {**one, "samples_per_second": 0} == pytest.approx({**other, "samples_per_second": 0}, rel=0, nan_ok=True)
 
 
-@pytest.mark.parametrize(("make", "skills"), [(make_ase, 1), (make_case, 3)], ids=["ase", "case"])
+@pytest.mark.parametrize(
+    ("make", "skills"), [(make_ase, 1), (make_case, 3), (make_calm, 1)], ids=["ase", "case", "calm"]
+)
 def test_rewards_do_not_look_at_what_every_clip_leaves_out(make: Callable, skills: int, tmp_path: Path) -> None:
     generator = torch.Generator().manual_seed(0)
     env = PointMass(16, skills=skills)

@@ -126,6 +126,16 @@ def test_a_checkpoint_of_something_else_is_refused(tmp_path: Path) -> None:
         other.load(tmp_path / "c")
 
 
+@pytest.mark.parametrize("part", ["watch", "generator", "meta"])
+def test_a_checkpoint_that_lacks_a_part_is_refused_in_one_line(tmp_path: Path, part: str) -> None:
+    make_runner(tmp_path / "c", samples=1).run()
+    state = checkpoint.load(tmp_path / "c")
+    checkpoint.save(tmp_path / "c", {name: value for name, value in state.items() if name != part})
+    with pytest.raises(AgentError, match=rf"c has no {part}: .* begin a new one") as error:
+        make_runner(tmp_path / "c").load(tmp_path / "c")
+    assert "\n" not in str(error.value)
+
+
 def test_another_autoreset_mode_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     runner = make_runner(tmp_path)
     env = PointMass(2)

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from murmillo.agents.common.watch import WATCHED, Watch, WatchConfig
+from murmillo.agents.common.failures import WATCHED, Trend, WatchConfig
+from murmillo.agents.common.watch import Watch
 from murmillo.cli.config import compose_train
 from tests.agents.toy import make_runner, small_ase
 
@@ -83,6 +84,14 @@ def test_what_is_to_be_tried_are_settings(failure: str) -> None:
             for part in name.split("."):
                 assert part in level, f"{agent} has no {name}"
                 level = level[part]
+
+
+def test_a_trend_by_hand() -> None:
+    trend = Trend()
+    for value in (4.0, 2.0, 3.0, 5.0, 9.0):
+        trend.add(value, memory=2)
+    # slow: 4, 3, 3, 4, 6.5; early is the fourth
+    assert trend == Trend(count=5, slow=6.5, lowest=3.0, early=4.0)
 
 
 def test_a_healthy_run_says_nothing() -> None:

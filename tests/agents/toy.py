@@ -13,6 +13,8 @@ from torch import Tensor
 
 from murmillo.agents.ase.agent import ASE
 from murmillo.agents.ase.config import ASEConfig
+from murmillo.agents.calm.agent import CALM
+from murmillo.agents.calm.config import CALMConfig, EncoderConfig
 from murmillo.agents.case.agent import CASE
 from murmillo.agents.case.config import CASEConfig
 from murmillo.agents.common.discriminator import DiscriminatorConfig
@@ -22,6 +24,8 @@ from murmillo.agents.common.runner import Runner, RunnerConfig
 
 SPEED = 0.6
 DT = 0.1
+MOTION_FRAMES = 6
+"""Length of the motions that the small CALM encodes."""
 
 
 class PointMass(VectorEnv):
@@ -170,6 +174,25 @@ def small_case(**changes: Any) -> CASEConfig:
 
 def make_case(env: PointMass, generator: torch.Generator, **changes: Any) -> CASE:
     return CASE(env, env.demonstrations, small_case(**changes), generator)
+
+
+def small_calm(**changes: Any) -> CALMConfig:
+    """CALM with networks and steps that fit the toy."""
+    ase = small_ase()
+    fields = {
+        "latent_dim": ase.latent_dim,
+        "latent_steps": (4, 16),
+        "window": ase.window,
+        "discriminator_style_hidden": (),
+        "ppo": ase.ppo,
+        "discriminator": ase.discriminator,
+        "encoder": EncoderConfig(frames=MOTION_FRAMES, hidden=(32, 32), shift=2, minibatch=64, pool=256),
+    }
+    return CALMConfig(**{**fields, **changes})
+
+
+def make_calm(env: PointMass, generator: torch.Generator, **changes: Any) -> CALM:
+    return CALM(env, env.demonstrations, small_calm(**changes), generator)
 
 
 def make_runner(

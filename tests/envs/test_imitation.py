@@ -13,7 +13,7 @@ from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
 
 import murmillo.envs
-from murmillo.envs import HumanoidVectorEnv, SuiteError
+from murmillo.envs import EnvConfig, HumanoidEnv, HumanoidVectorEnv, SuiteError
 from murmillo.envs._opengl import HEADLESS
 from murmillo.envs.observations import character_state
 
@@ -208,8 +208,13 @@ def test_a_reference_start_brings_the_clips_own_past():
     assert (window[:, 1:] - window[:, :-1]).abs().amax(-1).gt(0).any(-1).float().mean() > 0.9
     simulated = character_state(env.character, state.qpos, state.qvel, state.key_pos_w)
     torch.testing.assert_close(window[:, -1], simulated)
-    # each past frame is a frame of some clip: the demonstrations' function made it
-    assert library.window(torch.zeros(1, dtype=torch.int64), torch.zeros(1), 6).shape == (1, 6, 120)
+    # the past is the clip's that the start was drawn from
+    env.reset(seed=0)
+    drawn, starts = env._starts.draw, []
+    env._starts.draw = lambda *args: starts.append(drawn(*args)) or starts[-1]  # type: ignore[method-assign]
+    window = torch.from_numpy(env.reset(seed=0, options={"start": "reference"})[0]["window"])
+    past = library.window(starts[-1].clip, starts[-1].time, 6)
+    assert torch.equal(window[:, :-1], past[:, :-1])
 
 
 def test_features_of_a_clips_pose_are_the_simulations_to_1e_5():
@@ -278,6 +283,12 @@ def test_residual_forces_widen_the_action_and_move_the_character():
     assert helped.state.qvel[0, 0] > still.state.qvel[0, 0] + 0.1
 
 
+def test_one_world_leaves_its_callers_settings_alone():
+    config = EnvConfig(threads=1)
+    HumanoidEnv(config)
+    assert config == EnvConfig(threads=1)
+
+
 def test_one_world_equals_a_batch_of_one():
     single, batch = gymnasium.make(ID, window=2).unwrapped, make(1, window=2, autoreset="disabled")
     a, _ = single.reset(seed=4)
@@ -302,6 +313,10 @@ def test_one_world_equals_a_batch_of_one():
         ({"episode_steps": 0}, "episode_steps=0"),
         ({"residual_force": -1.0}, "residual_force=-1.0"),
         ({"autoreset": "never"}, "autoreset=never"),
+        ({"residual_reward": "men"}, "residual_reward=men: no such choice; there are: sum, mean"),
+        ({"fall": {"contact": "floor"}}, "fall.contact=floor: no such choice; there are: ground, any"),
+        ({"render_mode": "ascii"}, "render_mode=ascii: no such choice; there are: rgb_array, human"),
+        ({"starts": {"fallen_states": 0}}, "starts.fallen_states=0: needs at least 1"),
         ({"motions": "nowhere/at/all"}, "nowhere/at/all"),
         ({"character": "robot"}, "character=robot"),
     ],

@@ -113,3 +113,15 @@ def test_masked_bodies_are_the_only_ones_whose_features_are_left_out(character):
     assert feature_mask(character, ("shield",)).nonzero().flatten().tolist() == [117, 118, 119]
     assert feature_mask(character, ("sword", "shield")).sum() == 15
     assert not feature_mask(character, ()).any()
+
+
+def test_the_velocity_of_the_masked_joint_is_left_out_and_no_other(character):
+    qpos = character.default_qpos.clone()
+    mask, still = feature_mask(character, ("sword",)), torch.zeros(character.model.nv, dtype=torch.float64)
+    rest = features(character, qpos, still)
+    for joint in character.joints:
+        spinning = still.clone()
+        spinning[joint.dof] = 1.0
+        changed = features(character, qpos, spinning) != rest
+        assert changed.any()
+        assert mask[changed].tolist() == int(changed.sum()) * [joint.name == "right_wrist"], joint.name

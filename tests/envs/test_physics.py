@@ -119,6 +119,16 @@ def test_a_force_at_a_joint_brings_its_moment_about_the_centre_of_mass(character
     np.testing.assert_allclose(actual, expected, atol=1e-9)
 
 
+def test_a_force_lasts_no_longer_than_its_step(character):
+    pushed, free = make_physics(character, 1), make_physics(character, 1)
+    ctrl = character.targets(torch.zeros(1, 31, dtype=torch.float64))
+    pushed.step(ctrl, torch.full((1, 17, 3), 9.0))
+    free.load_state_dict({**pushed.state_dict(), "xfrc_applied": torch.zeros(1, 18, 6)})
+    for physics in (pushed, free):
+        physics.step(ctrl)
+    assert torch.equal(pushed.state.qpos, free.state.qpos)
+
+
 def test_residual_forces_turn_with_the_heading_and_spare_what_is_carried(character):
     residual = ResidualForces(character, scale=50.0)
     assert residual.action_dim == 45

@@ -1,0 +1,51 @@
+"""Starts one by one: what each kind of episode begins with."""
+
+import pytest
+import torch
+
+from murmillo.envs.character import Character, load_character
+from murmillo.envs.geometry import lowest_point
+from murmillo.envs.motion import MotionLibrary, load_clips
+from murmillo.envs.starts import DEFAULT, RECOVERY, REFERENCE, StartConfig, StartSampler
+
+
+@pytest.fixture(scope="module")
+def character() -> Character:
+    return load_character()
+
+
+@pytest.fixture(scope="module")
+def library(character: Character) -> MotionLibrary:
+    return MotionLibrary(load_clips("builtin", character), character)
+
+
+def test_a_reference_start_is_the_clips_pose_and_velocity_and_not_in_the_floor(
+    character: Character, library: MotionLibrary, generator: torch.Generator
+) -> None:
+    sampler = StartSampler(character, library, StartConfig(), 1)
+    sampler._library = deep = MotionLibrary(library.clips, character)
+    deep._qpos[:, 2] -= 0.02  # every clip stands in the floor
+    starts = sampler.draw(torch.zeros(50, dtype=torch.bool), generator, REFERENCE)
+    qpos, qvel = deep.pose(starts.clip, starts.time)
+    columns = [i for i in range(qpos.shape[1]) if i != 2]
+    torch.testing.assert_close(starts.qpos[:, columns], qpos[:, columns].double())
+    torch.testing.assert_close(starts.qvel, qvel.double())
+    assert lowest_point(character, starts.qpos).min() > -1e-5
+    assert (starts.qpos[:, 2] >= qpos[:, 2]).all()
+
+
+def test_only_who_fell_goes_on_from_there(
+    character: Character, library: MotionLibrary, generator: torch.Generator
+) -> None:
+    sampler = StartSampler(character, library, StartConfig(recovery=1.0, fallen=0.0, reference=0.0), 1)
+    fell = torch.arange(20) % 2 == 0
+    starts = sampler.draw(fell, generator)
+    assert torch.equal(starts.kind, torch.where(fell, RECOVERY, DEFAULT))
+    assert (starts.qpos[~fell, 2] == 0.89).all()
+    sampler.on_ground = False
+    assert (sampler.draw(fell, generator).kind == DEFAULT).all()
+
+
+@pytest.fixture
+def generator() -> torch.Generator:
+    return torch.Generator().manual_seed(0)
