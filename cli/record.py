@@ -125,7 +125,7 @@ def _follower(settings: RecordConfig, player: Any, env: Any) -> Callable[[float]
 
     if not settings.clips:
         return lambda part: None
-    if not hasattr(player, "follow"):
+    if not hasattr(player, "encode"):
         raise CommandError(
             f"clips={list(settings.clips)}: this run's agent follows no clips; choose a run of agent=calm"
         )

@@ -40,6 +40,7 @@ class ASE:
         """
         state_dim, action_dim = dimensions(env, demonstrations, config.window)
         self.config = config
+        self.latent_dim = config.latent_dim
         self.demonstrations = demonstrations
         self.generator = generator
         self.latents = LatentSequence(env.num_envs, config.latent_dim, generator, *config.latent_steps)
@@ -127,9 +128,16 @@ class ASE:
         self._observe_demonstrations()
         return named("discriminator", means.result()) | named("ppo", ppo)
 
+    def draw_latents(self, n: int) -> Tensor:
+        """Points of the sphere `[n, Z]`, drawn uniformly."""
+        return sample_sphere(n, self.latent_dim, self.generator)
+
+    def follow(self, latent: Tensor) -> None:
+        self.latents.hold(latent)
+
     def random_condition(self, n: int) -> Tensor:
         """Random latents `[n, Z]`, for a policy that is fitted to clips."""
-        return sample_sphere(n, self.config.latent_dim, self.generator)
+        return self.draw_latents(n)
 
     def _observe_demonstrations(self) -> None:
         drawn = self.demonstrations(self.config.discriminator.minibatch, self.generator)

@@ -41,6 +41,7 @@ class CALM:
         """
         state_dim, action_dim = dimensions(env, demonstrations, config.window)
         self.config = config
+        self.latent_dim = config.latent_dim
         self.demonstrations = demonstrations
         self.generator = generator
         self.model = ActorCritic(state_dim, action_dim, config.latent_dim, config.ppo, generator)
@@ -72,12 +73,15 @@ class CALM:
         return self.encoder(Windows(window, mask=mask))
 
     @torch.no_grad()
-    def random_condition(self, n: int) -> Tensor:
-        """Encodings `[n, Z]` of random motions, for a policy that is fitted to clips."""
+    def draw_latents(self, n: int) -> Tensor:
+        """Encodings `[n, Z]` of random motions."""
         return self.encoder(self._draw_motions(n))
 
+    def random_condition(self, n: int) -> Tensor:
+        """Encodings of random motions `[n, Z]`, for a policy that is fitted to clips."""
+        return self.draw_latents(n)
+
     def follow(self, latent: Tensor) -> None:
-        """Act under these latents `[N, Z]`, or `[Z]` in all worlds, until the next `reset`."""
         self.motions.hold(latent)
 
     def act(self, obs: Obs, *, deterministic: bool = False) -> Step:

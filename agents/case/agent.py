@@ -49,6 +49,7 @@ class CASE:
         state_dim, action_dim = dimensions(env, demonstrations, config.window)
         labels = _labels(env)
         self.config = config
+        self.latent_dim = config.latent_dim
         self.demonstrations = demonstrations
         self.generator = generator
         self.latents = LatentSequence(env.num_envs, config.latent_dim, generator, *config.latent_steps)
@@ -154,10 +155,17 @@ class CASE:
             | named("ppo", ppo)
         )
 
+    def draw_latents(self, n: int) -> Tensor:
+        """Points of the sphere `[n, Z]`, drawn uniformly."""
+        return sample_sphere(n, self.latent_dim, self.generator)
+
+    def follow(self, latent: Tensor) -> None:
+        self.latents.hold(latent)
+
     def random_condition(self, n: int) -> Tensor:
         """Random latents under random labels, `[n, Z + label_dim]`."""
         label = torch.randint(len(self.focal.score), (n,), generator=self.generator)
-        return self.condition(sample_sphere(n, self.config.latent_dim, self.generator), label).detach()
+        return self.condition(self.draw_latents(n), label).detach()
 
     def skill_tables(self) -> dict[str, Tensor]:
         """Share of each skill in the practice, and the discriminator's mean score of it."""

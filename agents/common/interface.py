@@ -70,6 +70,22 @@ class Directing(Protocol):
 
 
 @runtime_checkable
+class Steerable(Protocol):
+    """An agent whose latents somebody else may choose: an evaluation, or a policy above it."""
+
+    latent_dim: int
+    """Z."""
+
+    def draw_latents(self, n: int) -> Tensor:
+        """Latents `[n, Z]` as they are drawn in training."""
+        ...
+
+    def follow(self, latent: Tensor) -> None:
+        """Act under these latents `[N, Z]`, or `[Z]` in all worlds, until the next `reset`."""
+        ...
+
+
+@runtime_checkable
 class Labelled(Protocol):
     """An agent that is told a skill, and knows more of each than fits into a log."""
 

@@ -11,7 +11,7 @@ import torch
 
 from murmillo.agents.common import checkpoint
 from murmillo.agents.common.errors import AgentError
-from murmillo.agents.common.interface import Agent
+from murmillo.agents.common.interface import Agent, Steerable
 from murmillo.agents.common.rollout import Rollout, tensors, true_next_obs
 from murmillo.agents.common.runner import Runner
 from tests.agents.toy import PointMass, equal, make_ase, make_calm, make_case, make_runner, small_ase
@@ -100,6 +100,24 @@ def test_a_reset_begins_anew_in_its_worlds_only(make: Maker, generator: torch.Ge
     changed = (agent.act(obs).extras["latent"] != before).any(-1)
     assert changed[:10].all()
     assert not changed[10:].any()
+
+
+def test_latents_that_are_followed_stay_until_the_reset(make: Maker, generator: torch.Generator) -> None:
+    env = PointMass(5)
+    agent = make(env, generator)
+    assert isinstance(agent, Steerable)
+    obs = tensors(env.reset(seed=0)[0])
+    asked = agent.draw_latents(5)
+    assert asked.shape == (5, agent.latent_dim)
+    torch.testing.assert_close(asked.norm(dim=-1), torch.ones(5))
+    agent.follow(asked)
+    for _ in range(200):  # longer than any latent lasts by itself
+        assert torch.equal(agent.act(obs, deterministic=True).extras["latent"], asked)
+    agent.follow(asked[0])
+    assert torch.equal(agent.act(obs).extras["latent"], asked[0].expand(5, -1))
+    agent.reset(torch.tensor([1, 3]))
+    same = (agent.act(obs).extras["latent"] == asked[0]).all(-1)
+    assert same.tolist() == [True, False, True, False, True]
 
 
 def test_rewards_have_the_rollouts_shape(make: Maker, skills: int, generator: torch.Generator) -> None:
