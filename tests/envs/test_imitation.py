@@ -209,12 +209,25 @@ def test_a_reference_start_brings_the_clips_own_past():
     simulated = character_state(env.character, state.qpos, state.qvel, state.key_pos_w)
     torch.testing.assert_close(window[:, -1], simulated)
     # the past is the clip's that the start was drawn from
-    env.reset(seed=0)
-    drawn, starts = env._starts.draw, []
-    env._starts.draw = lambda *args: starts.append(drawn(*args)) or starts[-1]  # type: ignore[method-assign]
+    sample, moments = library.sample, []
+    library.sample = lambda *args: moments.append(sample(*args)) or moments[-1]  # type: ignore[method-assign]
     window = torch.from_numpy(env.reset(seed=0, options={"start": "reference"})[0]["window"])
-    past = library.window(starts[-1].clip, starts[-1].time, 6)
-    assert torch.equal(window[:, :-1], past[:, :-1])
+    [(clip, time)] = moments
+    assert torch.equal(window[:, :-1], library.window(clip, time, 6)[:, :-1])
+
+
+def test_starts_drawn_ahead_are_kept_with_the_state_and_forgotten_with_the_seed():
+    env, other = make(8, window=3, **UPRIGHT), make(8, window=3, **UPRIGHT)
+    env.reset(seed=0)
+    some = {"reset_mask": np.arange(8) < 3, "start": "reference"}
+    env.reset(options=some)  # of eight that are drawn ahead, five are left
+    other.load_state_dict(env.state_dict())
+    for worlds in (env, other):
+        worlds.reset(options=some)
+        worlds.reset(options=some)
+    assert torch.equal(env.state.qpos, other.state.qpos)
+    first = env.reset(seed=5)[0]["window"]
+    assert np.array_equal(first, env.reset(seed=5)[0]["window"])
 
 
 def test_features_of_a_clips_pose_are_the_simulations_to_1e_5():
