@@ -3,13 +3,11 @@
 import os
 from importlib import resources
 from pathlib import Path
-from typing import Any
-
-import yaml
 
 from murmillo.envs.character import Character
 from murmillo.envs.errors import MotionError
 from murmillo.envs.motion.clip import Clip
+from murmillo.envs.motion.dataset import SUFFIXES, read_dataset
 from murmillo.envs.motion.formats.poselib import read_poselib
 from murmillo.envs.motion.manifest import MANIFEST
 from murmillo.envs.motion.native import read_clips, save_clips
@@ -18,8 +16,6 @@ from murmillo.envs.motion.reading import read_bytes
 __all__ = ["BUILTIN", "load_clips", "save_clips"]
 
 BUILTIN = "builtin"
-_YAML = (".yaml", ".yml")
-_DATASET = "motions: [{file: NAME.npy, weight: 1.0}]"
 
 
 def load_clips(path: str | Path, character: Character) -> list[Clip]:
@@ -31,7 +27,7 @@ def load_clips(path: str | Path, character: Character) -> list[Clip]:
             - a folder with manifest.json, written by `save_clips`;
             - a folder with poselib .npy files: those that its dataset yaml lists, with their weights, or all of them
               where there is no yaml;
-            - a dataset yaml (`motions: [{file, weight}]`) beside poselib files;
+            - a dataset yaml (`motions: [{file, weight}]`) beside poselib files, or above them;
             - one poselib .npy, or one .npz of a folder with manifest.json.
 
     Raises:
@@ -49,7 +45,7 @@ def load_clips(path: str | Path, character: Character) -> list[Clip]:
         return _load_poselib({path: 1.0}, character)
     if suffix == ".npz":
         return read_clips(path.parent, character, only=path.name)
-    if suffix in _YAML:
+    if suffix in SUFFIXES:
         return _load_poselib(_read_dataset(path), character)
     raise MotionError(
         f"motions={path}: files of type {suffix or '(none)'} are unknown; known are .npy, .npz and .yaml, and "
@@ -66,7 +62,10 @@ def _load_builtin(character: Character) -> list[Clip]:
 
 
 def _load_folder(folder: Path, character: Character) -> list[Clip]:
-    files = sorted(folder.iterdir())
+    try:
+        files = sorted(folder.iterdir())
+    except OSError as error:
+        raise MotionError(f"motions={folder}: cannot be read ({error.strerror or error}); check the path") from None
     if folder / MANIFEST in files:
         return read_clips(folder, character)
     clips = {file: 1.0 for file in files if file.suffix.lower() == ".npy"}
@@ -74,7 +73,7 @@ def _load_folder(folder: Path, character: Character) -> list[Clip]:
         raise MotionError(
             f"motions={folder}: holds neither {MANIFEST} nor .npy clips; make clips with `murmillo motions import`"
         )
-    datasets = {file: _read_dataset(file) for file in files if file.suffix.lower() in _YAML}
+    datasets = {file: _read_dataset(file) for file in files if file.suffix.lower() in SUFFIXES}
     if not datasets:
         return _load_poselib(clips, character)
     complete = {file: weights for file, weights in datasets.items() if set(weights) <= set(clips)}
@@ -95,24 +94,9 @@ def _load_poselib(weights: dict[Path, float], character: Character) -> list[Clip
 
 
 def _read_dataset(file: Path) -> dict[Path, float]:
-    """The clips that a dataset yaml lists, beside it, and their weights, in its order.
-
-    Raises:
-        MotionError: no YAML, or an entry without a plain file name and a weight above 0.
-    """
-    try:
-        content: Any = yaml.safe_load(read_bytes(file))
-    except (yaml.YAMLError, ValueError, TypeError, RecursionError):  # PyYAML lets some of its own stumbles through
-        raise MotionError(f"{file}: is no YAML; it should read {_DATASET}") from None
-    entries = content.get("motions") if isinstance(content, dict) else None
-    if not isinstance(entries, list) or not entries:
-        raise MotionError(f"{file}: lists no clips; it should read {_DATASET}")
-    weights: dict[Path, float] = {}
-    for i, entry in enumerate(entries):
-        name, weight = (entry.get("file"), entry.get("weight")) if isinstance(entry, dict) else (None, None)
-        if not isinstance(name, str) or Path(name).name != name or file.parent / name in weights:
-            raise MotionError(f"{file}: motions[{i}].file must be the name of a clip beside it, and listed only once")
-        if not isinstance(weight, (int, float)) or not 0.0 < weight < 1e9:
-            raise MotionError(f"{file}: motions[{i}].weight must be a number above 0; correct it or remove the entry")
-        weights[file.parent / name] = float(weight)
-    return weights
+    """The clips that a dataset lists and their weights, which it must give."""
+    weights = read_dataset(file)
+    for clip, weight in weights.items():
+        if weight is None:
+            raise MotionError(f"{file}: gives {clip.name[:80]!a} no weight; write a number above 0")
+    return {clip: weight for clip, weight in weights.items() if weight is not None}

@@ -15,10 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from murmillo.envs.errors import MotionError
-from murmillo.envs.motion.formats.conventions import RawMotion, check_size, settle
+from murmillo.envs.motion.formats.conventions import settle
 from murmillo.envs.motion.formats.npy import read_numbers
 from murmillo.envs.motion.formats.options import ReadOptions
 from murmillo.envs.motion.formats.quaternions import IDENTITY, about_axis, conjugate, from_rotvec, multiply, rotate
+from murmillo.envs.motion.formats.raw_motion import RawMotion, check_size
 from murmillo.envs.motion.formats.recording import Recording, Skeleton
 from murmillo.envs.motion.formats.table import check_numbers
 
@@ -134,7 +135,7 @@ def _turns(arrays: dict[str, _Floats], file: Path) -> _Floats:
 def _rate(arrays: dict[str, _Floats], file: Path) -> float:
     rate = next((arrays[name] for name in _RATES if name in arrays), None)
     if rate is None or rate.size != 1:
-        raise MotionError(f"{file}: {_RATES[0]} is missing; give the recording's frames a second with fps=")
+        raise MotionError(f"{file}: {_RATES[0]} is missing; tell the recording's frames a second with fps= (--fps)")
     return float(rate.reshape(()))
 
 

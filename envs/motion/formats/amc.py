@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from murmillo.envs.errors import MotionError
 from murmillo.envs.motion.formats.asf import ROOT, AcclaimSkeleton, Bone, euler, find_asf, read_asf
-from murmillo.envs.motion.formats.conventions import RawMotion, check_size, settle
+from murmillo.envs.motion.formats.conventions import settle
 from murmillo.envs.motion.formats.options import ReadOptions
 from murmillo.envs.motion.formats.quaternions import IDENTITY, conjugate, multiply
+from murmillo.envs.motion.formats.raw_motion import RawMotion, check_size
 from murmillo.envs.motion.formats.recording import Recording, Skeleton
 from murmillo.envs.motion.formats.table import read_table
 from murmillo.envs.motion.reading import read_bytes

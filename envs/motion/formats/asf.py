@@ -66,7 +66,7 @@ def find_asf(amc: Path) -> Path:
         MotionError: none, or several that could be meant.
     """
     try:
-        found = sorted(file for file in amc.parent.iterdir() if file.suffix.lower() == ".asf")
+        found = sorted(file for file in amc.parent.iterdir() if file.suffix.lower() == ".asf" and file.is_file())
     except OSError as error:
         raise MotionError(f"{amc.parent}: cannot be read ({error.strerror or error}); check the path") from None
     if not found:

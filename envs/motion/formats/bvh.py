@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from murmillo.envs.errors import MotionError
-from murmillo.envs.motion.formats.conventions import RawMotion, check_size, rate_of, settle
-from murmillo.envs.motion.formats.options import ReadOptions
+from murmillo.envs.motion.formats.conventions import settle
+from murmillo.envs.motion.formats.options import ReadOptions, is_rate
 from murmillo.envs.motion.formats.quaternions import about_axes, multiply, rotate
+from murmillo.envs.motion.formats.raw_motion import RawMotion, check_size, rate_of
 from murmillo.envs.motion.formats.recording import Recording, Skeleton
 from murmillo.envs.motion.formats.table import read_table
 
@@ -172,8 +173,8 @@ def _fps(frame_time: str, file: Path) -> float:
         seconds = float(frame_time)
     except ValueError:
         seconds = math.nan
-    if not (math.isfinite(seconds) and seconds > 0.0):
-        raise MotionError(f"{file}: Frame Time is {frame_time!a}; write the seconds of one frame there, or give fps=")
+    if not (seconds > 0.0 and is_rate(1.0 / seconds)):
+        raise MotionError(f"{file}: Frame Time is {frame_time!a}; write the seconds of a frame, or tell fps= (--fps)")
     return rate_of(seconds)
 
 

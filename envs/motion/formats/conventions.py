@@ -1,28 +1,21 @@
 """From a file's own axes, unit and habits to SI units with z up; what had to be found out is reported."""
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from murmillo.envs.errors import MotionError
-from murmillo.envs.motion.formats.options import UNITS, ReadOptions, metres_in
+from murmillo.envs.motion.formats.options import UNITS, ReadOptions, is_rate, metres_in
 from murmillo.envs.motion.formats.quaternions import IDENTITY, about_axis, conjugate, multiply, rotate, turned_angle
-from murmillo.envs.motion.formats.recording import Recording, Skeleton, global_pose
+from murmillo.envs.motion.formats.raw_motion import RawMotion, checked
+from murmillo.envs.motion.formats.recording import Recording, global_pose
 from murmillo.envs.motion.formats.roles import Roles, chain_to_root, find_roles
 
 _Floats = NDArray[np.float64]
 
-MAX_JOINT_FRAMES = 5_000_000
-"""Frames times joints of a recording: half an hour at 120 Hz of 23 joints. It bounds the memory of what follows."""
-_LIMIT = 1e6
-"""No position, in any unit, is as large."""
-_NORMS = (0.5, 2.0)
-"""Of quaternions, which are then made units: exporters that interpolate without that write the like (DeepMimic's kick
-has 0.58)."""
-_NOTED_NORM = 0.01
 _PERSON = (0.8, 2.4)
 """[m] Along the bones from ankle to head joint, from a child to a giant."""
 _TYPICAL_PERSON = 1.4
@@ -35,42 +28,15 @@ _SAMPLES = 200
 """Frames that measurements look at."""
 
 
-@dataclass(frozen=True, eq=False)
-class RawMotion:
-    """A recording in its file's own axes and unit.
-
-    Attributes:
-        skeleton, root_pos, quat: as in `Recording`.
-        fps: frames a second.
-        up: the axis that the format says points up; None where files differ.
-        unit: metres in the file's unit, where the format says so.
-        drift: by joint, how far [file's unit] it strays from the fixed place in its parent's frame that it is given.
-        findings: what the reader found out.
-        loop: whether the file says that the last frame leads into the first.
-        fps_assumed: whether the file does not say how many frames a second it has.
-    """
-
-    skeleton: Skeleton
-    root_pos: _Floats
-    quat: _Floats
-    fps: float
-    up: str | None = None
-    unit: float | None = None
-    drift: dict[str, float] = field(default_factory=dict)
-    findings: dict[str, str] = field(default_factory=dict)
-    loop: bool = False
-    fps_assumed: bool = False
-
-
 def settle(raw: RawMotion, file: Path, options: ReadOptions) -> Recording:
     """The recording in metres, z up; its findings say what was measured, told or taken from the format.
 
     Raises:
         MotionError: numbers that no motion has, or a size that fits no unit.
     """
-    findings: dict[str, str] = dict(raw.findings)
+    raw = checked(raw, str(file))
+    findings = dict(raw.findings)
     fps = _settle_fps(raw, file, options, findings)
-    raw = _check(raw, file, findings)
     roles = find_roles(raw.skeleton)
     raw = _turn_up(raw, roles, options, findings)
     raw = _scale(raw, roles, file, options, findings)
@@ -92,63 +58,17 @@ def clip_name(file: Path) -> str:
     return "".join(char if char.isprintable() else "_" for char in file.stem) or "_"
 
 
-def check_size(frames: int, joints: int, place: str) -> None:
-    """Refuse a recording that would take up too much memory, before it does.
-
-    Raises:
-        MotionError: more than `MAX_JOINT_FRAMES`.
-    """
-    if frames * joints > MAX_JOINT_FRAMES:
-        raise MotionError(
-            f"{place}: {frames} frames of {joints} joints are more than murmillo reads at once; cut it into clips"
-        )
-
-
-def rate_of(frame_time: float) -> float:
-    """Frames a second, from the seconds of one frame as files round them: 0.033333 s means 30 Hz."""
-    fps = 1.0 / frame_time
-    return float(round(fps)) if abs(fps - round(fps)) < 5e-4 * fps else fps
-
-
 def _settle_fps(raw: RawMotion, file: Path, options: ReadOptions, findings: dict[str, str]) -> float:
     if options.fps is not None:
         findings["fps"] = f"{options.fps:g} (told)"
         return options.fps
     fps = raw.fps
-    if not (math.isfinite(fps) and fps > 0.0):
-        raise MotionError(f"{file}: fps is {fps:g}; give the recording's with fps=")
+    if not is_rate(fps):
+        raise MotionError(f"{file}: fps is {fps:g}; tell the recording's with fps= (--fps)")
     low, high = _USUAL_FPS
-    how = "format" if low <= fps <= high else "format, but unusual; if it is wrong, give fps="
+    how = "format" if low <= fps <= high else "format, but unusual; if it is wrong, tell it with fps= (--fps)"
     findings["fps"] = f"{fps:.5g} ({'assumed' if raw.fps_assumed else how})"
     return fps
-
-
-def _check(raw: RawMotion, file: Path, findings: dict[str, str]) -> RawMotion:
-    """The motion with unit quaternions."""
-    frames, joints = raw.quat.shape[:2]
-    if frames < 2:
-        raise MotionError(f"{file}: has {frames} frames; a clip needs at least 2, export it anew")
-    check_size(frames, joints, str(file))
-    for what, values in (("root position", raw.root_pos), ("rotations", raw.quat.reshape(frames, -1))):
-        broken = ~(np.abs(values) < _LIMIT).all(axis=1)  # so written, a NaN is broken too
-        if broken.any():
-            frame = int(broken.argmax())
-            raise MotionError(
-                f"{file}: frame {frame}, {what}: has a NaN, an infinity or a number above {_LIMIT:g}; export it anew"
-            )
-    if not (np.abs(raw.skeleton.offsets) < _LIMIT).all():
-        raise MotionError(f"{file}: a bone has a NaN, an infinity or a length above {_LIMIT:g}; export it anew")
-    norm = np.linalg.norm(raw.quat, axis=-1)
-    low, high = float(norm.min()), float(norm.max())
-    if low < _NORMS[0] or high > _NORMS[1]:
-        frame, joint = np.unravel_index(norm.argmin() if low < _NORMS[0] else norm.argmax(), norm.shape)
-        raise MotionError(
-            f"{file}: frame {frame}, {raw.skeleton.names[joint]}: its quaternion has norm {norm[frame, joint]:.3g}; "
-            "export unit quaternions"
-        )
-    if max(1.0 - low, high - 1.0) > _NOTED_NORM:
-        findings["quaternions"] = f"norms {low:.2f} to {high:.2f}; made units"
-    return replace(raw, quat=raw.quat / norm[..., None])
 
 
 def _turn_up(raw: RawMotion, roles: Roles | None, options: ReadOptions, findings: dict[str, str]) -> RawMotion:
@@ -205,7 +125,7 @@ def _scale(
         fitting = [unit for unit in UNITS.values() if _is_person(height * unit)]
         if not fitting:
             raise MotionError(
-                f"{file}: its figure is {height:.3g} units tall, which fits no unit for a person; give unit="
+                f"{file}: its figure is {height:.3g} units tall, which fits no unit for a person; give unit= (--unit)"
             )
         metres = min(fitting, key=lambda unit: abs(math.log(height * unit / _TYPICAL_PERSON)))
         how = "measured"
@@ -244,7 +164,9 @@ def _drop_rest(raw: RawMotion, file: Path, options: ReadOptions, findings: dict[
         findings["rest frame"] = "none" if options.drop_rest is None else "kept (told)"
         return raw
     if len(raw.quat) - rest < 2:
-        raise MotionError(f"{file}: has fewer than 2 frames after its rest pose; keep that with drop_rest=false")
+        raise MotionError(
+            f"{file}: has fewer than 2 frames after its rest pose; keep it: drop_rest=False (--keep-rest)"
+        )
     findings["rest frame"] = f"{rest} left out" + ("" if options.drop_rest is None else " (told)")
     return replace(raw, quat=raw.quat[rest:], root_pos=raw.root_pos[rest:])
 

@@ -11,11 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from murmillo.envs.errors import MotionError
-from murmillo.envs.motion.formats.conventions import RawMotion, check_size, rate_of, settle
+from murmillo.envs.motion.formats.conventions import settle
 from murmillo.envs.motion.formats.humanoid import DEEPMIMIC
 from murmillo.envs.motion.formats.json_data import number_rows, read_json
-from murmillo.envs.motion.formats.options import ReadOptions
+from murmillo.envs.motion.formats.options import RATES, ReadOptions
 from murmillo.envs.motion.formats.quaternions import IDENTITY, about_axis, slerp
+from murmillo.envs.motion.formats.raw_motion import RawMotion, check_size, checked, rate_of
 from murmillo.envs.motion.formats.recording import Recording
 
 _Floats = NDArray[np.float64]
@@ -38,7 +39,7 @@ _COLUMNS = {
 """Numbers of each joint, from column 4 on; wrists have none."""
 _WIDTH = 4 + sum(_COLUMNS.values())
 _DURATION_TOLERANCE = 0.02
-_LONGEST_FRAME = 10.0
+_FRAME_TIMES = (1.0 / RATES[1], 10.0)
 """[s] Nothing that is a motion rests longer between two frames."""
 
 
@@ -64,7 +65,8 @@ def read_deepmimic(data: bytes, file: Path, options: ReadOptions) -> Recording:
         DEEPMIMIC, frames[:, 1:4], quat, options.fps or 0.0, up="y", unit=1.0, loop=content.get("Loop") == "wrap"
     )
     if options.fps is None:
-        raw = _at_one_rate(raw, _durations(frames[:, 0], file), file)
+        durations = _durations(frames[:, 0], file)
+        raw = _at_one_rate(checked(raw, str(file)), durations, file)
     return settle(raw, file, options)
 
 
@@ -73,11 +75,11 @@ def _durations(column: _Floats, file: Path) -> _Floats:
     durations = column[:-1]
     if len(durations) == 0:
         raise MotionError(f"{file}: has fewer than 2 frames; get the file anew")
-    broken = ~((durations > 0.0) & (durations < _LONGEST_FRAME))  # so written, a NaN is broken too
+    broken = ~((durations >= _FRAME_TIMES[0]) & (durations < _FRAME_TIMES[1]))  # so written, a NaN is broken too
     if broken.any():
         frame = int(broken.argmax())
         raise MotionError(
-            f"{file}: frame {frame} lasts {durations[frame]:g} s; correct the first number of its row, or give fps="
+            f"{file}: frame {frame} lasts {durations[frame]:g} s; correct its first number, or tell fps= (--fps)"
         )
     return durations
 
@@ -98,5 +100,6 @@ def _at_one_rate(raw: RawMotion, durations: _Floats, file: Path) -> RawMotion:
         fps=fps,
         root_pos=raw.root_pos[before] + part[:, None] * (raw.root_pos[before + 1] - raw.root_pos[before]),
         quat=slerp(raw.quat[before], raw.quat[before + 1], part[:, None]),
-        findings={"frame durations": f"{durations.min():.3g} to {durations.max():.3g} s; resampled to one rate"},
+        findings=raw.findings
+        | {"frame durations": f"{durations.min():.3g} to {durations.max():.3g} s; resampled to one rate"},
     )

@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from murmillo.envs.errors import MotionError
-from murmillo.envs.motion.formats.conventions import RawMotion, check_size, settle
+from murmillo.envs.motion.formats.conventions import settle
 from murmillo.envs.motion.formats.humanoid import HUMANOID
 from murmillo.envs.motion.formats.json_data import number_rows, read_json
 from murmillo.envs.motion.formats.options import ReadOptions
+from murmillo.envs.motion.formats.raw_motion import RawMotion, check_size
 from murmillo.envs.motion.formats.recording import Recording
 
 _ROOT = HUMANOID.names[0]
@@ -32,7 +33,7 @@ def read_iccgan(data: bytes, file: Path, options: ReadOptions) -> Recording:
     if not (isinstance(frames, list) and all(isinstance(frame, dict) for frame in frames)):
         raise MotionError(f"{file}: has no list of maps, frames, and so is no ICCGAN clip; get the file anew")
     if options.fps is None and type(fps) not in (int, float):
-        raise MotionError(f"{file}: fps is missing; give the recording's frames a second with fps=")
+        raise MotionError(f"{file}: fps is missing; tell the recording's frames a second with fps= (--fps)")
     check_size(len(frames), len(HUMANOID.names), str(file))
     given = {link for frame in frames for link in frame}
     foreign = sorted(given - set(HUMANOID.names))

@@ -1,6 +1,5 @@
 """The .npy container, read without numpy's loader: nothing is evaluated, nothing allocated beyond the file's size."""
 
-import math
 import re
 import struct
 
@@ -50,10 +49,7 @@ def read_numbers(data: bytes, place: str) -> NDArray[np.float64]:
     descr, shape, payload = split_npy(data, place)
     if descr not in _NUMBERS:
         raise MotionError(f"{place}: holds values of type {descr!a}; save numbers, such as float64 (<f8)")
-    dtype = np.dtype(descr)
-    if math.prod(shape) * dtype.itemsize != len(payload):
-        raise MotionError(f"{place}: {len(payload)} bytes do not make the shape {list(shape)}; copy the file anew")
-    return np.frombuffer(payload, dtype=dtype).reshape(shape).astype(np.float64)
+    return _shaped(payload, descr, shape, place).astype(np.float64)
 
 
 def read_float_array(data: bytes, place: str) -> NDArray[np.float64]:
@@ -65,6 +61,13 @@ def read_float_array(data: bytes, place: str) -> NDArray[np.float64]:
     descr, shape, payload = split_npy(data, place)
     if descr != "<f8":
         raise MotionError(f"{place}: holds numbers of type {descr}; save float64 (<f8)")
-    if math.prod(shape) * 8 != len(payload):
-        raise MotionError(f"{place}: {len(payload)} bytes do not make the shape {list(shape)}; copy the file anew")
-    return np.frombuffer(payload, dtype="<f8").reshape(shape)
+    return _shaped(payload, descr, shape, place)
+
+
+def _shaped(payload: bytes, descr: str, shape: tuple[int, ...], place: str) -> NDArray:
+    try:
+        return np.frombuffer(payload, dtype=descr).reshape(shape)
+    except ValueError:
+        raise MotionError(
+            f"{place}: {len(payload)} bytes do not make the shape {list(shape)}; copy the file anew"
+        ) from None

@@ -7,6 +7,8 @@ from murmillo.envs.errors import MotionError
 
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048, "in": 0.0254, "in/0.45": 0.0254 / 0.45}
 """Metres in a unit. The last is Acclaim's: recordings of CMU, and BVH files made from them, have it."""
+RATES = (0.01, 1e5)
+"""[Hz] Between which every rate is that a recording can have."""
 
 
 @dataclass(frozen=True)
@@ -33,10 +35,17 @@ class ReadOptions:
     def __post_init__(self) -> None:
         if self.up not in (None, "y", "z"):
             raise MotionError(f"up={self.up}: is no axis that can point up; give y or z")
-        if self.fps is not None and not (math.isfinite(self.fps) and self.fps > 0.0):
-            raise MotionError(f"fps={self.fps:g}: give the frames a second of the recording, a number above 0")
+        if self.fps is not None and not is_rate(self.fps):
+            raise MotionError(
+                f"fps={self.fps:g}: give the frames a second of the recording, from {RATES[0]:g} to {RATES[1]:g}"
+            )
         if self.unit is not None:
             metres_in(self.unit)
+
+
+def is_rate(fps: float) -> bool:
+    """Whether a recording can have so many frames a second [Hz]."""
+    return RATES[0] <= fps <= RATES[1]
 
 
 def metres_in(unit: str) -> float:

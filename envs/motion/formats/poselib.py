@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 from murmillo.envs.character import Character
 from murmillo.envs.errors import MotionError
 from murmillo.envs.motion.clip import Clip, check_clip
-from murmillo.envs.motion.formats.conventions import RawMotion, settle
+from murmillo.envs.motion.formats.conventions import settle
 from murmillo.envs.motion.formats.npy import split_npy
 from murmillo.envs.motion.formats.options import ReadOptions
+from murmillo.envs.motion.formats.raw_motion import RawMotion
 from murmillo.envs.motion.formats.recording import Recording, Skeleton
 from murmillo.envs.motion.formats.safe_unpickle import read_pickle
 
@@ -90,7 +91,7 @@ def read_poselib_recording(data: bytes, file: Path, options: ReadOptions) -> Rec
     root_pos = _array(motion, "root_translation.arr", file, (len(rotation), 3))
     fps = motion.get("fps") if options.fps is None else options.fps
     if not isinstance(fps, (int, float)):
-        raise MotionError(f"{file}: fps is missing; give the recording's with fps=")
+        raise MotionError(f"{file}: fps is missing; tell the recording's with fps= (--fps)")
     skeleton = Skeleton(tuple(names), tuple(int(parent) for parent in parents), offsets)
     raw = RawMotion(skeleton, root_pos, np.roll(rotation, 1, axis=-1), float(fps), up="z", unit=1.0)
     recording = settle(raw, file, options)

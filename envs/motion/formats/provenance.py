@@ -9,7 +9,7 @@ _NAMES = ("license", "licence", "copying", "readme")
 _MAX_BYTES = 2**16
 _CC_PARTS = r"(?P<nc>[ -](?:NC|NonCommercial))?(?P<end>[ -](?:ND|NoDerivs|NoDerivatives|SA|ShareAlike))?"
 _CREATIVE_COMMONS = re.compile(
-    rf"\b(?:CC[ -]BY|Attribution){_CC_PARTS} (?:\(CC[^)]*\) )?(?P<version>\d\.0)\b", re.IGNORECASE
+    rf"\b(?:CC[ -]BY|Attribution){_CC_PARTS}[ -](?:\(CC[^)]*\) )?(?P<version>\d\.0)\b", re.IGNORECASE
 )
 _OTHERS = {
     "CC0-1.0": re.compile(r"\bCC0\b", re.IGNORECASE),
@@ -18,6 +18,8 @@ _OTHERS = {
 }
 _COPYRIGHT = re.compile(r"Copyright +(?:\([cC]\) *|© *)?\d{4}[^\r\n]{0,80}")
 _FREE = re.compile(r"CC0-1\.0|MIT|Apache-2\.0|CC-BY-\d\.0")
+_RESTRICTED = re.compile(r"\bnon-?\s?commercial|\bresearch\s+(?:use|purposes?)\s+only", re.IGNORECASE)
+"""No free licence has such words: beside one, they are about a part of the files."""
 
 
 @dataclass(frozen=True)
@@ -34,20 +36,24 @@ class Provenance:
 
 
 def find_provenance(folder: Path) -> Provenance:
-    """What the licence in this folder says, or else its read-me, if that names one licence only."""
+    """What the licence in this folder says; where there is none, its read-me, if that names one licence only."""
     try:
         files = sorted(file for file in folder.iterdir() if file.stem.lower() in _NAMES and file.is_file())
     except OSError:
         return Provenance()
-    for file in sorted(files, key=lambda file: _NAMES.index(file.stem.lower())):
-        text = _read(file)
-        licences = _licences(text)
-        # the text of one licence may mention others, but begins with its own name
-        if licences and (file.stem.lower() != "readme" or len(set(licences)) == 1):
-            owner = _COPYRIGHT.search(text)
-            source = owner[0].strip() if owner and owner[0].isprintable() else folder.name
-            return Provenance(source or "unknown", licences[0])
-    return Provenance()
+    if not files:
+        return Provenance()
+    file = min(files, key=lambda file: _NAMES.index(file.stem.lower()))
+    text = _read(file)
+    licences = _licences(text)
+    # the text of one licence may mention others, but begins with its own name
+    if not licences or (file.stem.lower() == "readme" and len(set(licences)) > 1):
+        return Provenance()
+    if _FREE.fullmatch(licences[0]) and _RESTRICTED.search(text):
+        return Provenance()
+    owner = _COPYRIGHT.search(text)
+    source = owner[0].strip() if owner and owner[0].isprintable() else folder.name
+    return Provenance(source or "unknown", licences[0])
 
 
 def _read(file: Path) -> str:

@@ -5,11 +5,9 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
-
-import yaml
 
 from murmillo.envs.errors import MotionError
+from murmillo.envs.motion.dataset import SUFFIXES, read_dataset
 from murmillo.envs.motion.formats.amass import read_amass
 from murmillo.envs.motion.formats.amc import read_amc
 from murmillo.envs.motion.formats.bvh import read_bvh
@@ -31,10 +29,7 @@ READERS: dict[str, Callable[[bytes, Path, ReadOptions], Recording]] = {
     ".txt": read_deepmimic,
 }
 """By suffix. An .asf is read with the .amc beside it."""
-_YAML = (".yaml", ".yml")
 _NO_MOTIONS = ("readme", "license", "licence", "copying", "notice", "changelog", "manifest", "labels")
-_MAX_DATASET = 2**20
-_DATASET = "motions: [{file: FOLDER/NAME.json, weight: 1.0}]"
 
 
 @dataclass(frozen=True)
@@ -65,8 +60,9 @@ def iter_files(path: str | Path) -> Iterator[ListedFile]:
         if not files:
             raise MotionError(f"{path}: holds no motions; known are {', '.join(READERS)}")
         yield from _named([ListedFile(file) for file in files], path)
-    elif path.suffix.lower() in _YAML:
-        yield from _named(_dataset(path), path.parent)
+    elif path.suffix.lower() in SUFFIXES:
+        listed = [ListedFile(file, weight=weight) for file, weight in read_dataset(path).items()]
+        yield from _named(listed, path.parent)
     else:
         yield ListedFile(path)
 
@@ -112,7 +108,7 @@ def _read(file: Path, options: ReadOptions) -> Recording:
         raise MotionError(f"{file}: is a skeleton without motion; give the .amc files beside it")
     if suffix not in READERS:
         raise MotionError(f"{file}: files of type {suffix or '(none)'} are unknown; known are {', '.join(READERS)}")
-    if not file.is_file():  # a pipe would be waited for
+    if not os.path.isfile(file):  # a pipe would be waited for; Path.is_file raises for names that no file can have
         raise MotionError(f"{file}: is no file; check the path")
     recording = READERS[suffix](read_bytes(file), file, options)
     if recording.licence != "unknown":
@@ -135,28 +131,3 @@ def _named(files: list[ListedFile], folder: Path) -> Iterator[ListedFile]:
             parts = file.path.relative_to(folder).parts
             file = replace(file, name=clip_name(Path("_".join(parts).replace(".", "_"))))
         yield file
-
-
-def _dataset(file: Path) -> list[ListedFile]:
-    """What a dataset of ASE or AdaptNet lists, relative to its own folder; a weight of null is not given."""
-    data = read_bytes(file)
-    if len(data) > _MAX_DATASET:
-        raise MotionError(f"{file}: is too large for a dataset; it should read {_DATASET}")
-    try:
-        content: Any = yaml.safe_load(data)
-    except (yaml.YAMLError, ValueError, TypeError, RecursionError):  # PyYAML lets some of its own stumbles through
-        raise MotionError(f"{file}: is no YAML; it should read {_DATASET}") from None
-    entries = content.get("motions") if isinstance(content, dict) else None
-    if not isinstance(entries, list) or not entries:
-        raise MotionError(f"{file}: lists no motions; it should read {_DATASET}")
-    files: dict[Path, ListedFile] = {}
-    for i, entry in enumerate(entries):
-        name, weight = (entry.get("file"), entry.get("weight")) if isinstance(entry, dict) else (None, None)
-        if not isinstance(name, str) or Path(name).is_absolute() or ".." in Path(name).parts or "\0" in name:
-            raise MotionError(f"{file}: motions[{i}].file must be the path of a motion in the same folder, or below")
-        if weight is not None and not (type(weight) in (int, float) and 0.0 < weight < 1e9):
-            raise MotionError(f"{file}: motions[{i}].weight must be a number above 0, or null")
-        if file.parent / name in files:
-            raise MotionError(f"{file}: motions[{i}].file is listed twice; remove one")
-        files[file.parent / name] = ListedFile(file.parent / name, weight=None if weight is None else float(weight))
-    return list(files.values())

@@ -9,11 +9,9 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from murmillo.envs.errors import MotionError
 from murmillo.envs.motion.clip import Clip
-from murmillo.envs.motion.reading import read_bytes
+from murmillo.envs.motion.reading import parse_yaml, read_bytes
 
 _FORMS = 'JSON or YAML that maps names to labels, {"walk_01": "walk"}, or CSV lines, walk_01,walk'
 
@@ -35,14 +33,14 @@ def read_labels(file: str | Path) -> dict[str, str]:
         MotionError: it is missing, or holds no names with labels.
     """
     file = Path(file)
-    readers = {".json": json.loads, ".yaml": yaml.safe_load, ".yml": yaml.safe_load, ".csv": _read_csv}
+    readers = {".json": json.loads, ".yaml": parse_yaml, ".yml": parse_yaml, ".csv": _read_csv}
     read = readers.get(file.suffix.lower())
     if read is None:
         raise MotionError(f"{file}: is no file of labels; give {_FORMS}")
     data = read_bytes(file)
     try:
         content: Any = read(data.decode("utf-8-sig"))
-    except (ValueError, TypeError, RecursionError, yaml.YAMLError, csv.Error):
+    except (ValueError, RecursionError, csv.Error):
         raise MotionError(f"{file}: cannot be understood; give {_FORMS}") from None
     if not isinstance(content, dict) or not content:
         raise MotionError(f"{file}: holds no labels; give {_FORMS}")

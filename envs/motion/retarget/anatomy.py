@@ -123,6 +123,9 @@ def _check_sizes(motion: "_View", place: str) -> None:
     for a, b in (*pairs, ("left_hip", "right_hip"), ("left_shoulder", "right_shoulder"), ("pelvis", "left_shoulder")):
         if np.linalg.norm(motion.at(a) - motion.at(b), axis=1).min() < _NO_LENGTH:
             raise MotionError(f"{place}: {a} and {b} are in one place; correct the skeleton map, or the file's offsets")
+    trunk = motion.between("left_shoulder", "right_shoulder") - motion.between("left_hip", "right_hip")
+    if np.linalg.norm(trunk, axis=1).min() < _NO_LENGTH:
+        raise MotionError(f"{place}: its trunk has no length; correct the skeleton map, or the file's offsets")
 
 
 class _View:

@@ -3,6 +3,7 @@
 import mink
 import mujoco
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from murmillo.envs.motion.retarget.figure import Figure, nearer
 
@@ -32,7 +33,8 @@ class JointBounds(mink.Limit):
         value = np.empty(len(low))
         q = configuration.q
         value[self._hinge_action] = q[self._hinge_qpos]
-        rotvec = nearer(_log(q[self._ball_qpos]), low[self._ball_action], high[self._ball_action])
+        rotvec = Rotation.from_quat(q[self._ball_qpos], scalar_first=True).as_rotvec()
+        rotvec = nearer(rotvec, low[self._ball_action], high[self._ball_action])
         value[self._ball_action] = rotvec
         self._rows[self._ball_action[:, :, None], self._ball_dof[:, None, :]] = _right_jacobian_inverse(rotvec)
         bounds = self._gain * np.concatenate([high - value, value - low])
@@ -88,13 +90,6 @@ def lowest_points(model: mujoco.MjModel, data: mujoco.MjData, geom: int) -> np.n
     axis = turn[:, 2]
     downhill = axis * axis[2] - [0.0, 0.0, 1.0]  # across the axis
     return ends + size[0] * downhill / max(float(np.linalg.norm(downhill)), 1e-6)
-
-
-def _log(quat: np.ndarray) -> np.ndarray:
-    """Rotation vectors [n, 3] of the unit quaternions [n, 4] wxyz."""
-    quat = np.where(quat[:, :1] < 0.0, -quat, quat)
-    sine = np.linalg.norm(quat[:, 1:], axis=1, keepdims=True)
-    return quat[:, 1:] * np.where(sine > 1e-8, 2.0 * np.arctan2(sine, quat[:, :1]) / np.maximum(sine, 1e-8), 2.0)
 
 
 def _right_jacobian_inverse(rotvec: np.ndarray) -> np.ndarray:

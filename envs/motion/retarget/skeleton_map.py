@@ -8,10 +8,9 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from murmillo.envs.errors import MotionError
 from murmillo.envs.motion.formats.recording import Skeleton
+from murmillo.envs.motion.reading import parse_yaml, read_yaml
 
 SIDES = ("left", "right")
 _LIMBS = (("shoulder", "elbow", "wrist"), ("hip", "knee", "ankle"))
@@ -42,13 +41,7 @@ def load_map(file: Path) -> SkeletonMap:
     Raises:
         MotionError: no such file, no YAML, or points that are missing or unknown.
     """
-    try:
-        content = yaml.safe_load(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise MotionError(f"{file}: cannot be read ({error.strerror or error}); give a skeleton map in YAML") from None
-    except (yaml.YAMLError, UnicodeDecodeError):
-        raise MotionError(f"{file}: is no YAML; give a skeleton map such as those in retarget/skeletons") from None
-    return _checked_map(content, str(file))
+    return _checked_map(read_yaml(file, "a skeleton map", "as those in retarget/skeletons"), str(file))
 
 
 @cache
@@ -56,7 +49,7 @@ def shipped_maps() -> tuple[SkeletonMap, ...]:
     """The maps of known skeletons that come with the package, by file name."""
     folder = files("murmillo.envs.motion.retarget") / "skeletons"
     entries = sorted((entry for entry in folder.iterdir() if entry.name.endswith(".yaml")), key=lambda e: e.name)
-    return tuple(_checked_map(yaml.safe_load(entry.read_text(encoding="utf-8")), entry.name) for entry in entries)
+    return tuple(_checked_map(parse_yaml(entry.read_bytes()), entry.name) for entry in entries)
 
 
 def choose_map(skeleton: Skeleton, place: str) -> SkeletonMap:
@@ -72,7 +65,7 @@ def choose_map(skeleton: Skeleton, place: str) -> SkeletonMap:
     if fitting:
         return max(fitting, key=lambda one: (_found(one, known), _depth(skeleton, known[_plain(one.points["chest"])])))
     nearest = max(shipped_maps(), key=lambda one: _found(one, known))
-    raise MotionError(_unknown_joints(nearest, skeleton, place, "is nearest; give a skeleton map (YAML)"))
+    raise MotionError(_unknown_joints(nearest, skeleton, place, "is nearest; give a skeleton map (YAML, --map)"))
 
 
 def locate(skeleton_map: SkeletonMap, skeleton: Skeleton, place: str) -> dict[str, int]:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from murmillo.envs.character import Character, load_character
+from murmillo.envs.errors import MotionError
 from murmillo.envs.motion import Clip
 
 SHARED = Path(__file__).parents[4] / "shared" / "motions"
@@ -35,6 +36,19 @@ def shared_motions() -> Path:
     if not SHARED.is_dir():
         pytest.skip("needs the recordings in ../shared/motions")
     return SHARED
+
+
+@pytest.fixture(scope="session")
+def refuses() -> Callable[[Callable[[], Any], str, str], None]:
+    """Check that reading is refused in one line that begins with the place and holds the reason, a regex."""
+
+    def check(read: Callable[[], Any], reason: str, place: str) -> None:
+        with pytest.raises(MotionError, match=reason) as caught:
+            read()
+        assert str(caught.value).startswith(place)
+        assert "\n" not in str(caught.value)
+
+    return check
 
 
 def random_qpos(character: Character, frames: int, seed: int) -> np.ndarray:

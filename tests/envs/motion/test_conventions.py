@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from murmillo.envs.errors import MotionError
-from murmillo.envs.motion.formats.conventions import RawMotion, settle
+from murmillo.envs.motion.formats.conventions import settle
 from murmillo.envs.motion.formats.humanoid import HUMANOID
 from murmillo.envs.motion.formats.options import UNITS, ReadOptions
 from murmillo.envs.motion.formats.quaternions import IDENTITY, about_axis, conjugate, multiply, rotate
+from murmillo.envs.motion.formats.raw_motion import RawMotion
 from murmillo.envs.motion.formats.recording import Skeleton
 from murmillo.envs.motion.formats.roles import find_roles
 
@@ -106,6 +107,13 @@ def test_units_are_told_apart_by_the_figures_size(walk, unit):
     assert same(recording, walk)
 
 
+def test_a_unit_that_the_format_says_is_taken_if_it_makes_a_person(walk):
+    assert settle(replace(scaled(walk, 0.8), unit=1.0), FILE, ReadOptions()).findings["unit"] == "m (format)"
+    recording = settle(replace(walk, unit=0.01), FILE, ReadOptions())
+    assert recording.findings["unit"] == "m (measured)"
+    assert same(recording, walk)
+
+
 def test_a_sound_clip_is_left_alone(walk):
     recording = settle(walk, FILE, ReadOptions())
     assert same(recording, walk)
@@ -142,8 +150,15 @@ def test_a_jump_later_on_is_no_rest_pose(walk):
     assert settle(replace(walk, quat=quat), FILE, ReadOptions()).frames == 60
 
 
+def test_a_first_step_as_fast_as_the_others_is_no_rest_pose(walk):
+    slow = replace(walk, quat=walk.quat[::5], root_pos=walk.root_pos[::5], fps=6.0)
+    assert settle(slow, FILE, ReadOptions()).frames == 12
+
+
 def test_a_size_that_no_person_has_asks_for_the_unit(walk):
-    with pytest.raises(MotionError, match=r"some clip\.bvh: its figure is 1\.38e\+05 units tall.*give unit="):
+    with pytest.raises(
+        MotionError, match=r"some clip\.bvh: its figure is 1\.38e\+05 units tall.*give unit= \(--unit\)"
+    ):
         settle(scaled(walk, 1e5), FILE, ReadOptions())
     assert settle(scaled(walk, 9.0), FILE, ReadOptions(unit="m")).findings["height"] == "12.39 m"
 
@@ -163,9 +178,9 @@ def test_a_rate_that_no_recorder_has_is_pointed_out(walk):
     assert "unusual" in settle(replace(walk, fps=3.0), FILE, ReadOptions()).findings["fps"]
 
 
-@pytest.mark.parametrize("fps", [0.0, -30.0, np.nan, np.inf])
+@pytest.mark.parametrize("fps", [0.0, -30.0, np.nan, np.inf, 1e-200])
 def test_no_motion_has_such_a_rate(walk, fps):
-    with pytest.raises(MotionError, match="fps is"):
+    with pytest.raises(MotionError, match=r"fps is .* fps= \(--fps\)"):
         settle(replace(walk, fps=fps), FILE, ReadOptions())
     assert settle(replace(walk, fps=fps), FILE, ReadOptions(fps=30.0)).fps == 30.0
 
@@ -175,6 +190,7 @@ def test_quaternions_are_made_units_or_refused(walk):
     quat[5, 3] *= 0.8
     recording = settle(replace(walk, quat=quat), FILE, ReadOptions())
     assert same(recording, walk)
+    np.testing.assert_allclose(np.linalg.norm(recording.quat, axis=-1), 1.0)
     assert recording.findings["quaternions"] == "norms 0.80 to 1.00; made units"
     quat[5, 3] = 0.0
     with pytest.raises(MotionError, match="frame 5, right_upper_arm: its quaternion has norm 0"):
@@ -182,7 +198,8 @@ def test_quaternions_are_made_units_or_refused(walk):
 
 
 @pytest.mark.parametrize(
-    "options", [{"up": "x"}, {"unit": "furlong"}, {"unit": "-1"}, {"unit": "nan"}, {"fps": 0.0}, {"fps": np.nan}]
+    "options",
+    [{"up": "x"}, {"unit": "furlong"}, {"unit": "-1"}, {"unit": "nan"}, {"fps": 0.0}, {"fps": np.nan}, {"fps": 1e-200}],
 )
 def test_options_that_nothing_can_have(options):
     with pytest.raises(MotionError, match=f"^{next(iter(options))}="):

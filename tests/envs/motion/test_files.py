@@ -144,6 +144,12 @@ def saved(array: np.ndarray, **options) -> bytes:
     return file.getvalue()
 
 
+def nothing_of_shape(shape: str) -> bytes:
+    """The header of an array without its numbers."""
+    header = f"{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}".encode()
+    return b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little") + header
+
+
 @pytest.mark.parametrize(
     ("data", "reason"),
     [
@@ -155,6 +161,7 @@ def saved(array: np.ndarray, **options) -> bytes:
         (zipped("qpos.npy", saved(np.zeros((47, 20)).T)), "Fortran"),
         (zipped("qpos.npy", saved(np.zeros((20, 47)))[:-8]), "do not make the shape"),
         (zipped("qpos.npy", saved(np.zeros((20, 47))).replace(b"(20, 47)", b"(20,999)")), "do not make the shape"),
+        (zipped("qpos.npy", nothing_of_shape("(0, 999999999999, 999999999999)")), "0 bytes do not make the shape"),
         (zipped("qpos.npy", saved(np.array([object], dtype=object), allow_pickle=True)), r"type \|O"),
         (zipped("qpos.npy", saved(np.zeros((20, 47)))), "root: its quaternion has norm 0"),
         (zipped("qpos.npy", saved(np.full((20, 47), np.nan))), "clip walk: frame 0 of 20 has a NaN"),
@@ -275,6 +282,9 @@ def test_of_several_datasets_the_complete_one_is_taken(poselib_folder, character
         "motions: [{file: one.npy, weight: .nan}]",
         "motions: [{file: one.npy, weight: 1}, {file: one.npy, weight: 1}]",
         "!!python/object/apply:os.system ['touch marker']",
+        "motions: [{file: one.npy, weight: true}]",
+        'motions: [{file: "\\0.npy", weight: 1}]',
+        'motions: !!int ""',
         "\x00",
     ],
 )

@@ -92,6 +92,9 @@ def test_datasets_list_files_below_them_with_weights(folder):
         ("motions: [{file: a/walk.bvh}, {file: a/walk.bvh}]", r"motions\[1\].file is listed twice"),
         ("motions: [{file: a/walk.bvh, weight: -1}]", r"motions\[0\].weight must be a number above 0"),
         ("motions: [{file: a/walk.bvh, weight: true}]", r"motions\[0\].weight must be a number above 0"),
+        (r'motions: [{file: "\0.bvh"}]', r"motions\[0\].file must be"),
+        ('motions: !!int ""', "is no YAML"),  # over which PyYAML itself stumbles
+        ("motions: !!bool maybe", "is no YAML"),
         ("#" * 2**21, "too large for a dataset"),
     ],
 )
@@ -163,6 +166,10 @@ LICENCES = [
     ("COPYING", "Apache License\n   Version 2.0, January 2004", "Apache-2.0", True),
     ("LICENSE", "All rights reserved. You may not submit this.", "unknown", False),
     ("notes.txt", "MIT License", "unknown", False),
+    ("README.md", "Motions: CC-BY-NC-4.0. Code: MIT License.", "unknown", False),
+    ("README.md", "CC-BY-NC-SA-4.0", "CC-BY-NC-SA-4.0", False),
+    ("LICENSE", "MIT License ... The motions are for non-commercial use.", "unknown", False),
+    ("README.md", "MIT License, but data for research purposes only", "unknown", False),
 ]
 
 
@@ -173,6 +180,20 @@ def test_licences_that_cannot_be_misread(tmp_path, name, text, licence, redistri
     assert (found.licence, found.redistributable) == (licence, redistributable)
     if licence == "MIT":
         assert found.source == "Copyright (c) 2018 Xue Bin Peng"
+
+
+def test_a_read_me_does_not_overrule_a_licence_that_is_not_known(tmp_path):
+    (tmp_path / "LICENSE").write_text("All rights reserved.")
+    (tmp_path / "README.md").write_text("Made with a tool under the MIT License")
+    assert find_provenance(tmp_path).licence == "unknown"
+
+
+def test_a_listed_file_whose_name_no_file_can_have(folder):
+    (folder / "clips.yaml").write_text(f"motions: [{{file: {'x' * 300}.bvh}}, {{file: a/walk.bvh}}]")
+    recordings, problems = read_recordings(folder / "clips.yaml")
+    assert [recording.name for recording in recordings] == ["walk"]
+    assert len(problems) == 1
+    assert "is no file" in problems[0]
 
 
 def test_a_recording_has_the_licence_of_its_folder(folder):

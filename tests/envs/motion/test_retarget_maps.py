@@ -46,6 +46,14 @@ def test_namespaces_and_case_do_not_matter() -> None:
     assert choose_map(skeleton_of(MAPS["LAFAN1"], **lower), "clip").name == "LAFAN1"
 
 
+def test_of_maps_that_name_as_many_joints_the_one_with_the_higher_chest_is_chosen() -> None:
+    """A skeleton of Mixamo has the joint that is the chest in CMU's, below its own."""
+    names, parents = skeleton_of(MAPS["Mixamo"]).names, skeleton_of(MAPS["Mixamo"]).parents
+    spined = (-1, 0, 1, *(parent + 1 if parent else 0 for parent in parents[2:]))
+    skeleton = Skeleton((names[0], "Spine1", *names[1:]), spined, np.ones((len(names) + 1, 3)))
+    assert choose_map(skeleton, "clip").name == "Mixamo"
+
+
 def test_an_unknown_joint_is_named_with_its_neighbour() -> None:
     skeleton = skeleton_of(MAPS["CMU Acclaim"], left_knee="lshin_tibia")
     line = "walk: no joint 'ltibia' for left_knee (nearest here is 'lshin_tibia'); the skeleton CMU Acclaim is nearest"
@@ -70,6 +78,8 @@ def test_a_map_is_read_from_a_file(tmp_path: Path) -> None:
     ("content", "line"),
     [
         ("a: [1", "is no YAML"),
+        ("points: {pelvis: 2001-99-99}", "is no YAML"),
+        ("[" * 600, "is no YAML"),
         ("- 1", "is no skeleton map"),
         ("points: {pelvis: [Hips]}", "is no skeleton map"),
         ("points: {left_nee: Knee}", "unknown point 'left_nee'; is it left_knee?"),
