@@ -9,27 +9,48 @@ import gymnasium
 from murmillo.envs.config import EnvConfig
 from murmillo.envs.errors import SuiteError
 from murmillo.envs.single import HumanoidEnv
-from murmillo.envs.tasks import Imitation
+from murmillo.envs.tasks import TASKS, Task
 from murmillo.envs.vector import HumanoidVectorEnv
 
 
 def register() -> None:
-    """Add the suite's environments to gymnasium's registry."""
-    gymnasium.register(
-        "murmillo/Imitation-v0",
-        entry_point="murmillo.envs.registration:imitation",
-        vector_entry_point="murmillo.envs.registration:imitation_vector",
-    )
+    """Add the suite's environments to gymnasium's registry, one for each task."""
+    for name in TASKS:
+        gymnasium.register(
+            f"murmillo/{name}-v0",
+            entry_point="murmillo.envs.registration:make",
+            vector_entry_point="murmillo.envs.registration:make_vector",
+            kwargs={"task_name": name},
+        )
 
 
-def imitation(render_mode: Any = None, **kwargs: Any) -> HumanoidEnv:
-    """One world; keyword arguments are those of `EnvConfig`."""
-    return HumanoidEnv(env_config(threads=kwargs.pop("threads", 1), **kwargs), Imitation(), render_mode)
+def make(task_name: str, render_mode: Any = None, task: dict[str, Any] | None = None, **kwargs: Any) -> HumanoidEnv:
+    """One world; keyword arguments are those of `EnvConfig`, and `task` has those of the task's own."""
+    config = env_config(threads=kwargs.pop("threads", 1), **kwargs)
+    return HumanoidEnv(config, make_task(task_name, **task or {}), render_mode)
 
 
-def imitation_vector(num_envs: int = 1, render_mode: Any = None, **kwargs: Any) -> HumanoidVectorEnv:
-    """N worlds; keyword arguments are those of `EnvConfig`."""
-    return HumanoidVectorEnv(num_envs, env_config(**kwargs), Imitation(), render_mode)
+def make_vector(
+    task_name: str, num_envs: int = 1, render_mode: Any = None, task: dict[str, Any] | None = None, **kwargs: Any
+) -> HumanoidVectorEnv:
+    """N worlds; keyword arguments are those of `EnvConfig`, and `task` has those of the task's own."""
+    return HumanoidVectorEnv(num_envs, env_config(**kwargs), make_task(task_name, **task or {}), render_mode)
+
+
+def make_task(name: str, **arguments: Any) -> Task:
+    """The task of this name, with its own arguments.
+
+    Raises:
+        SuiteError: there is no such task, or no such argument.
+    """
+    if name not in TASKS:
+        raise SuiteError(f"task={name}: no such task; there are: {', '.join(TASKS)}")
+    cls = TASKS[name]
+    if cls.config_type is not None:
+        return cls(_build(cls.config_type, arguments, "task."))  # type: ignore[call-arg]  those with arguments take them
+    if arguments:
+        raise SuiteError(f"task.{next(iter(arguments))}: {name} takes no arguments of its own")
+    return cls()
 
 
 def env_config(**kwargs: Any) -> EnvConfig:

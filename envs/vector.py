@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import Any, Literal
 
 import gymnasium
+import mujoco
 import numpy as np
 import torch
 from gymnasium.utils import seeding
@@ -70,11 +71,11 @@ class HumanoidVectorEnv(VectorEnv):
         self.render_mode = render_mode
         self._mode = AutoresetMode[config.autoreset.upper()]
         self.metadata = {**type(self).metadata, "autoreset_mode": self._mode}
-        edit = count_every_contact if config.fall.contact == "any" else None
-        self.character = load_character(config.character, edit)
+        self.task = task or Imitation()
+        self.character = load_character(config.character, self._edit)
         self.library = MotionLibrary(load_clips(config.motions, self.character), self.character)
         self.physics = make_physics(self.character, num_envs, threads=config.threads)
-        self.task = task or Imitation()
+        self.task.bind(num_envs, self.character)
         self._fallen = FallDetector(self.character, config.fall)
         self._starts = StartSampler(self.character, self.library, config.starts, num_envs, config.window)
         self._residual = _residual_forces(self.character, config)
@@ -138,6 +139,7 @@ class HumanoidVectorEnv(VectorEnv):
         fall = self._fallen(self.state) & (self._steps > 1) & (self._free_steps == 0)
         terminated = (fall | self.task.terminated(self.state) | healed) & ~resetting
         truncated = (self._steps >= self.config.episode_steps) & ~terminated & ~resetting
+        self._pass_time()
         self._ended, self._fell = terminated | truncated, torch.where(resetting, self._fell, fall)
         info: dict[str, Any] = {
             "reward_terms": {name: term.numpy() for name, term in terms.items()},
@@ -258,6 +260,7 @@ class HumanoidVectorEnv(VectorEnv):
     def state_dict(self) -> dict[str, Any]:
         """All that the next step depends on."""
         parts = {"physics": self.physics.state_dict(), "starts": self._starts.state_dict()}
+        parts["task"] = self.task.state_dict()
         own = {name: getattr(self, f"_{name}").clone() for name in _OWN_STATE}
         return {**parts, "generator": self._generator.get_state(), **own}
 
@@ -265,11 +268,17 @@ class HumanoidVectorEnv(VectorEnv):
         """Continue from `state_dict`, bit for bit."""
         self.physics.load_state_dict(state["physics"])
         self._starts.load_state_dict(state["starts"])
+        self.task.load_state_dict(state["task"])
         self._generator.set_state(state["generator"])
         for name in _OWN_STATE:
             setattr(self, f"_{name}", state[name].clone())
 
     # --- inside a step -----------------------------------------------------------------------------------------------
+
+    def _edit(self, spec: mujoco.MjSpec) -> None:
+        if self.config.fall.contact == "any":
+            count_every_contact(spec)
+        self.task.edit(spec)
 
     def _set_spaces(self) -> None:
         width = state_dim(self.character)
@@ -333,7 +342,14 @@ class HumanoidVectorEnv(VectorEnv):
         self._free_steps[ids] = torch.where(free, self.config.starts.free_steps, 0)
         self._skill = self._skill.index_copy(0, ids, self._draw_skills(len(ids)))
         self._ended = self._ended & ~mask
-        self.task.reset(ids, self.state)
+        self.task.reset(ids, self.state, self._generator)
+
+    def _pass_time(self) -> None:
+        """New goals and skills where their time is over."""
+        self.task.advance(self.state, self._generator)
+        if self.task.skill_steps:
+            due = (self._steps % self.task.skill_steps == 0).nonzero().squeeze(-1)
+            self._skill = self._skill.index_copy(0, due, self._draw_skills(len(due)))
 
     def _draw_skills(self, n: int) -> Tensor:
         if self._skill_weights is None:
