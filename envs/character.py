@@ -50,7 +50,7 @@ class Character:
         self.name = name
         self.control_dt = CONTROL_DT
         self._spec = spec
-        self.model = _without_visuals(spec).compile()
+        self.model = without_visuals(spec).compile()
         model = self.model
         self.substeps = round(CONTROL_DT / model.opt.timestep)
         if not np.isclose(self.substeps * model.opt.timestep, CONTROL_DT):
@@ -118,6 +118,10 @@ class Character:
         """Key points [..., K, 3] [m] of the pose qpos [..., nq]; they lie at their bodies' origins."""
         return self.forward_kinematics(qpos)[0][..., self.body_ids(self.key_bodies), :]
 
+    def spec(self) -> mujoco.MjSpec:
+        """A copy of the spec that the models are compiled from, visual geoms and all."""
+        return self._spec.copy()
+
     def render_model(self, offscreen: tuple[int, int] | None = None) -> mujoco.MjModel:
         """The model with its visual geoms, for pictures; its qpos layout is that of `model`."""
         spec = self._spec.copy()
@@ -156,7 +160,7 @@ def joint_box(model: mujoco.MjModel, name: str) -> np.ndarray:
     return joint.user.reshape(3, 2).copy()
 
 
-def _without_visuals(spec: mujoco.MjSpec) -> mujoco.MjSpec:
+def without_visuals(spec: mujoco.MjSpec) -> mujoco.MjSpec:
     """Massless, untouchable geoms and all that serves the eye cost time in every step; training leaves them out."""
     bare = spec.copy()
     for geom in list(bare.geoms):

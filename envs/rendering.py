@@ -1,6 +1,7 @@
 """Pictures of one world."""
 
 import threading
+from collections.abc import Sequence
 from typing import Any
 
 import mujoco
@@ -9,18 +10,20 @@ import numpy as np
 from murmillo.envs._opengl import HEADLESS
 from murmillo.envs.character import Character
 from murmillo.envs.errors import SuiteError
+from murmillo.envs.markers import Marker, draw_markers
+from murmillo.envs.scene import Scene
 
 
 class FrameRenderer:
     """Off-screen frames, with the visual geoms that the simulated model leaves out."""
 
-    def __init__(self, character: Character, width: int = 640, height: int = 480, camera: str = "track") -> None:
+    def __init__(self, scene: Scene | Character, width: int = 640, height: int = 480, camera: str = "track") -> None:
         """`camera` is one of the MJCF's: "track", "side" or "front"; all follow the character.
 
         Raises:
             SuiteError: no OpenGL context can be had, or there is no such camera.
         """
-        self._model = character.render_model(offscreen=(width, height))
+        self._model = scene.render_model(offscreen=(width, height))
         self._data = mujoco.MjData(self._model)
         cameras = [self._model.camera(i).name for i in range(self._model.ncam)]
         if camera not in cameras:
@@ -34,11 +37,12 @@ class FrameRenderer:
                 "osmesa before mujoco is imported"
             ) from error
 
-    def frame(self, qpos: np.ndarray) -> np.ndarray:
-        """RGB frame [height, width, 3] uint8 of the pose qpos [nq]."""
+    def frame(self, qpos: np.ndarray, markers: Sequence[Marker] = ()) -> np.ndarray:
+        """RGB frame [height, width, 3] uint8 of the pose qpos [nq], props and all."""
         self._data.qpos[:] = qpos
         mujoco.mj_forward(self._model, self._data)
         self._renderer.update_scene(self._data, self._camera)
+        draw_markers(self._renderer.scene, markers)
         return self._renderer.render()
 
     def close(self) -> None:
@@ -48,22 +52,25 @@ class FrameRenderer:
 class Window:
     """A live window on a screen."""
 
-    def __init__(self, character: Character) -> None:
+    def __init__(self, scene: Scene | Character) -> None:
         """Raises SuiteError where there is no screen."""
         if HEADLESS:  # MuJoCo's viewer would end the process
             raise SuiteError("render_mode=human: there is no screen (DISPLAY is not set); use rgb_array")
         from mujoco import viewer  # needs a screen's libraries
 
-        self._model = character.render_model()
+        self._model = scene.render_model()
         self._data = mujoco.MjData(self._model)
         others = set(threading.enumerate())
         self._viewer: Any = viewer.launch_passive(self._model, self._data)
         self._threads = set(threading.enumerate()) - others
 
-    def show(self, qpos: np.ndarray) -> None:
-        """Show the pose qpos [nq]."""
-        self._data.qpos[:] = qpos
-        mujoco.mj_forward(self._model, self._data)
+    def show(self, qpos: np.ndarray, markers: Sequence[Marker] = ()) -> None:
+        """Show the pose qpos [nq], props and all."""
+        with self._viewer.lock():
+            self._data.qpos[:] = qpos
+            mujoco.mj_forward(self._model, self._data)
+            self._viewer.user_scn.ngeom = 0
+            draw_markers(self._viewer.user_scn, markers)
         self._viewer.sync()
 
     def close(self) -> None:

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from typing import Any, Literal
 
 import gymnasium
-import mujoco
 import numpy as np
 import torch
 from gymnasium.utils import seeding
@@ -21,6 +20,7 @@ from murmillo.envs.observations import character_state, state_dim
 from murmillo.envs.physics import State, make_physics
 from murmillo.envs.rendering import FrameRenderer, Window
 from murmillo.envs.residual import ResidualForces
+from murmillo.envs.scene import Scene
 from murmillo.envs.starts import FALLEN, KINDS, RECOVERY, REFERENCE, StartSampler
 from murmillo.envs.tasks import Imitation, Task
 
@@ -72,9 +72,11 @@ class HumanoidVectorEnv(VectorEnv):
         self._mode = AutoresetMode[config.autoreset.upper()]
         self.metadata = {**type(self).metadata, "autoreset_mode": self._mode}
         self.task = task or Imitation()
-        self.character = load_character(config.character, self._edit)
+        edit = count_every_contact if config.fall.contact == "any" else None
+        self.character = load_character(config.character, edit)
+        self.scene = Scene(self.character, self.task.edit)
         self.library = MotionLibrary(load_clips(config.motions, self.character), self.character)
-        self.physics = make_physics(self.character, num_envs, threads=config.threads)
+        self.physics = make_physics(self.scene, num_envs, threads=config.threads)
         self.task.bind(num_envs, self.character)
         self._fallen = FallDetector(self.character, config.fall)
         self._starts = StartSampler(self.character, self.library, config.starts, num_envs, config.window)
@@ -163,14 +165,13 @@ class HumanoidVectorEnv(VectorEnv):
             config = self.config
             human = self.render_mode == "human"
             self._screen = (
-                Window(self.character)
-                if human
-                else FrameRenderer(self.character, config.width, config.height, config.camera)
+                Window(self.scene) if human else FrameRenderer(self.scene, config.width, config.height, config.camera)
             )
-        poses = self.state.qpos[:RENDERED_WORLDS].numpy()
+        state = self.state
+        poses = torch.cat((state.qpos, state.prop_qpos.flatten(1)), dim=-1)[:RENDERED_WORLDS].numpy()
         if isinstance(self._screen, Window):
-            return self._screen.show(poses[0])
-        return tuple(self._screen.frame(pose) for pose in poses)
+            return self._screen.show(poses[0], self.task.markers(state, 0))
+        return tuple(self._screen.frame(pose, self.task.markers(state, i)) for i, pose in enumerate(poses))
 
     def close_extras(self, **kwargs: Any) -> None:
         if self._screen is not None:
@@ -275,11 +276,6 @@ class HumanoidVectorEnv(VectorEnv):
 
     # --- inside a step -----------------------------------------------------------------------------------------------
 
-    def _edit(self, spec: mujoco.MjSpec) -> None:
-        if self.config.fall.contact == "any":
-            count_every_contact(spec)
-        self.task.edit(spec)
-
     def _set_spaces(self) -> None:
         width = state_dim(self.character)
         limit = {"low": -STATE_LIMIT, "high": STATE_LIMIT, "dtype": np.float32}
@@ -305,6 +301,8 @@ class HumanoidVectorEnv(VectorEnv):
         action = action.double()
         joints, extra = action.split([self.character.action_dim, expected[1] - self.character.action_dim], dim=-1)
         force = self._residual(extra, self.state) if self._residual else None
+        if (push := self.task.push(self.state)) is not None:
+            self.push(push)
         pushed, self._push_w = self._push_w, None
         outer = force if pushed is None else pushed if force is None else force + pushed
         self.physics.step(self.character.targets(joints), outer)

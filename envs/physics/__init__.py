@@ -6,14 +6,18 @@ from murmillo.envs.character import Character
 from murmillo.envs.errors import SuiteError
 from murmillo.envs.physics.cpu import CpuPhysics
 from murmillo.envs.physics.interface import Physics, State
+from murmillo.envs.scene import Scene
 
 __all__ = ["Physics", "State", "make_physics"]
 
 
-def make_physics(character: Character, num_envs: int, *, backend: Literal["cpu"] = "cpu", threads: int = 0) -> Physics:
-    """N worlds of the character.
+def make_physics(
+    scene: Scene | Character, num_envs: int, *, backend: Literal["cpu"] = "cpu", threads: int = 0
+) -> Physics:
+    """N worlds of the scene.
 
     Args:
+        scene: the character with its props, or the character alone.
         backend: "cpu" is MuJoCo's pool of simulations.
         threads: CPU threads; 0 takes every CPU.
 
@@ -26,4 +30,4 @@ def make_physics(character: Character, num_envs: int, *, backend: Literal["cpu"]
         raise SuiteError(f"num_envs={num_envs}: needs at least one world")
     if threads < 0:
         raise SuiteError(f"threads={threads}: needs a number of threads, or 0 for every CPU")
-    return CpuPhysics(character, num_envs, threads)
+    return CpuPhysics(scene if isinstance(scene, Scene) else Scene(scene), num_envs, threads)

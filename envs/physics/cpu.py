@@ -9,38 +9,46 @@ import torch
 from mujoco.batch import Batch
 from torch import Tensor
 
-from murmillo.envs.character import Character
 from murmillo.envs.physics.interface import State
+from murmillo.envs.scene import Scene
 
 _INTEGRATED = ("time", "qpos", "qvel", "qacc_warmstart", "ctrl", "xfrc_applied")
-"""What a step reads of the state before it; the character has no activations, mocap bodies or user data."""
+"""What a step reads of the state before it; the scene has no activations, mocap bodies or user data."""
 
 
 class CpuPhysics:
     """`mujoco.batch.Batch` behind the `Physics` protocol. Results do not depend on the number of threads."""
 
-    def __init__(self, character: Character, num_envs: int, threads: int = 0) -> None:
+    def __init__(self, scene: Scene, num_envs: int, threads: int = 0) -> None:
         """`threads` = 0 takes every CPU."""
+        character, props = scene.character, len(scene.props)
         self.num_envs = num_envs
         self._substeps = character.substeps
-        self._batch = Batch(character.model, num_envs, threads)
+        self._batch = Batch(scene.model, num_envs, threads)
         self._ctrl = self._batch.bind("ctrl")
-        self._xfrc = self._batch.bind("xfrc_applied")
+        self._bodies = slice(1, 1 + len(character.bodies))
+        self._xfrc = self._batch.bind("xfrc_applied")[:, self._bodies]
         self._time = self._batch.bind("time")
-        ground = self._batch.bind("sensordata")[:, character.contact_slice]
+        qpos, qvel = _view(self._batch.bind("qpos")), _view(self._batch.bind("qvel"))
+        sensors = _view(self._batch.bind("sensordata"))
+        nq, nv, bodies = character.model.nq, character.model.nv, len(character.bodies)
         self.state = State(
-            qpos=_view(self._batch.bind("qpos")),
-            qvel=_view(self._batch.bind("qvel")),
-            body_pos_w=_view(self._batch.bind("xpos"))[:, 1:],
-            body_quat_w=_view(self._batch.bind("xquat"))[:, 1:],
-            body_com_w=_view(self._batch.bind("xipos"))[:, 1:],
+            qpos=qpos[:, :nq],
+            qvel=qvel[:, :nv],
+            body_pos_w=_view(self._batch.bind("xpos"))[:, self._bodies],
+            body_quat_w=_view(self._batch.bind("xquat"))[:, self._bodies],
+            body_com_w=_view(self._batch.bind("xipos"))[:, self._bodies],
             site_pos_w=_view(self._batch.bind("site_xpos")),
-            ground_force_w=_view(ground).unflatten(1, (len(character.bodies), 3)),
+            ground_force_w=sensors[:, character.contact_slice].unflatten(1, (bodies, 3)),
             actuator_force=_view(self._batch.bind("actuator_force")),
             key_sites=torch.as_tensor(character.key_sites),
+            prop_qpos=qpos[:, nq:].unflatten(1, (props, 7)),
+            prop_qvel=qvel[:, nv:].unflatten(1, (props, 6)),
+            hit_force_w=torch.zeros(num_envs, props, bodies, 3, dtype=torch.float64),
         )
+        self._hits = sensors[:, scene.hit_slice].unflatten(1, (props, bodies, 3))
         self._expected_time = np.zeros(num_envs)
-        self._timestep = character.model.opt.timestep
+        self._timestep = scene.model.opt.timestep
         self._batch.reset(stage=int(mujoco.mjtStage.mjSTAGE_VEL))
 
     def step(self, ctrl: Tensor, body_force_w: Tensor | None = None) -> None:
@@ -49,10 +57,22 @@ class CpuPhysics:
             self._xfrc[:] = 0.0
         else:
             arm = self.state.body_pos_w - self.state.body_com_w
-            self._xfrc[:, 1:, :3] = body_force_w.numpy()
-            self._xfrc[:, 1:, 3:] = torch.linalg.cross(arm, body_force_w.double()).numpy()
+            self._xfrc[..., :3] = body_force_w.numpy()
+            self._xfrc[..., 3:] = torch.linalg.cross(arm, body_force_w.double()).numpy()
         self._expected_time = self._time.ravel() + 0.5 * self._substeps * self._timestep
-        self._batch.step(nstep=self._substeps, stage=int(mujoco.mjtStage.mjSTAGE_VEL))
+        if self._hits.numel():
+            self._step_and_feel()
+        else:
+            self._batch.step(nstep=self._substeps, stage=int(mujoco.mjtStage.mjSTAGE_VEL))
+
+    def _step_and_feel(self) -> None:
+        """Each substep by itself: a fast prop touches a body for no longer."""
+        felt = self.state.hit_force_w
+        felt.zero_()
+        for left in reversed(range(self._substeps)):
+            stage = mujoco.mjtStage.mjSTAGE_NONE if left else mujoco.mjtStage.mjSTAGE_VEL
+            self._batch.step(nstep=1, stage=int(stage))
+            felt.copy_(torch.where(self._hits.abs() > felt.abs(), self._hits, felt))
 
     def healed(self) -> Tensor:
         # MuJoCo resets a diverged simulation to its defaults; its clock then starts again from zero

@@ -8,9 +8,11 @@ from torch import Tensor
 
 @dataclass(frozen=True)
 class State:
-    """Live float64 views of N worlds, current after every `step` and `write`. Read them; never write to them.
+    """Live float64 views of N worlds, current after every `step` and `write`.
 
-    Frames: `_w` world. B bodies without the world, in MJCF order.
+    Read them and never write to them, but for the props' own state, which is their task's to set.
+
+    Frames: `_w` world. B bodies of the character in MJCF order, P props.
 
     Attributes:
         qpos: [N, nq] root position [m] and quaternion (wxyz), then the joints in MJCF order.
@@ -22,6 +24,9 @@ class State:
         ground_force_w: [N, B, 3] force of the ground on each body in the last substep [N].
         actuator_force: [N, A] torque of the PD control at each axis of the joints in the last substep [N m].
         key_sites: [K] which of the sites are the key points.
+        prop_qpos: [N, P, 7] the props' positions [m] and quaternions (wxyz) in the world.
+        prop_qvel: [N, P, 6] their linear velocities (world) [m/s] and angular ones (own frame) [rad/s].
+        hit_force_w: [N, P, B, 3] force of each prop on each body, each axis' greatest of the last step's substeps [N].
     """
 
     qpos: Tensor
@@ -33,6 +38,9 @@ class State:
     ground_force_w: Tensor
     actuator_force: Tensor
     key_sites: Tensor
+    prop_qpos: Tensor
+    prop_qvel: Tensor
+    hit_force_w: Tensor
 
     @property
     def key_pos_w(self) -> Tensor:
@@ -56,7 +64,10 @@ class Physics(Protocol):
         ...
 
     def write(self, env_ids: Tensor, qpos: Tensor, qvel: Tensor) -> None:
-        """Put the worlds env_ids [n] into qpos [n, nq] and qvel [n, nv], and forget all that the solver kept."""
+        """Put the worlds env_ids [n] into qpos [n, nq] and qvel [n, nv], and forget all that the solver kept.
+
+        Props go back to where the scene has them.
+        """
         ...
 
     def healed(self) -> Tensor:

@@ -1,0 +1,100 @@
+"""The world that is simulated: the character, and what a task puts beside it."""
+
+from collections.abc import Sequence
+
+import mujoco
+
+from murmillo.envs.character import Character, SpecEdit, without_visuals
+from murmillo.envs.errors import SuiteError
+
+_HIT = "hit_"  # contact sensors of this prefix hold a prop's force on a body
+_GROUND = "ground_"
+
+_ASIDE = 50.0
+"""[m] Where a prop lies until its task puts it somewhere."""
+
+
+class Scene:
+    """One compiled model: the character's bodies, joints and sensors first, props behind them.
+
+    A prop is a body of its own on a free joint, as `add_box` makes it.
+
+    Attributes:
+        character: it; its own model has no props.
+        model: what is simulated, without visual geoms.
+        props: names of the P props.
+    """
+
+    def __init__(self, character: Character, edit: SpecEdit | None = None) -> None:
+        """`edit` adds props, terrain and the like to the character's spec.
+
+        Raises:
+            SuiteError: the edit changed the character's own part, or added a moving body that is no prop.
+        """
+        self.character = character
+        self._spec = character.spec()
+        if edit is not None:
+            edit(self._spec)
+        self.model = without_visuals(self._spec).compile()
+        first = len(character.bodies) + 1
+        own = tuple(self.model.body(i).name for i in range(1, min(first, self.model.nbody)))
+        if own != character.bodies or self.model.nu != character.model.nu:
+            raise SuiteError("scene: the edit changed the character's bodies or actuators; edit the character itself")
+        self.props = tuple(self.model.body(i).name for i in range(first, self.model.nbody))
+        if self.model.nq != character.model.nq + 7 * len(self.props):
+            raise SuiteError(f"scene: props ({', '.join(self.props)}) need one free joint each; see add_box")
+        self.hit_slice = self._hit_slice()
+        """Where sensordata holds the props' forces on the bodies, [P * B * 3]."""
+
+    def render_model(self, offscreen: tuple[int, int] | None = None) -> mujoco.MjModel:
+        """The model with its visual geoms, for pictures; its qpos layout is that of `model`."""
+        spec = self._spec.copy()
+        if offscreen is not None:
+            spec.visual.global_.offwidth, spec.visual.global_.offheight = offscreen
+        return spec.compile()
+
+    def _hit_slice(self) -> slice:
+        names = [self.model.sensor(i).name for i in range(self.model.nsensor)]
+        wanted = [f"{_HIT}{prop}_{body}" for prop in self.props for body in self.character.bodies]
+        if [name for name in names if name.startswith(_HIT)] != wanted:
+            raise SuiteError(f"scene: needs one contact sensor {_HIT}<prop>_<body> a body for each prop; see add_box")
+        start = int(self.model.sensor(wanted[0]).adr[0]) if wanted else self.model.nsensordata
+        return slice(start, start + 3 * len(wanted))
+
+
+def add_box(
+    spec: mujoco.MjSpec,
+    name: str,
+    size: Sequence[float],
+    mass: float,
+    rgba: tuple[float, float, float, float] = (0.55, 0.38, 0.22, 1.0),
+    margin: float = 0.0,
+) -> None:
+    """Add a free box whose hits on each of the character's bodies are felt (`State.hit_force_w`).
+
+    Args:
+        spec: the character's; its bodies must all be there already.
+        name: of the prop.
+        size: lengths of its edges [m].
+        mass: [kg].
+        rgba: its colour.
+        margin: distance [m] at which it is already stopped; at 40 m/s it moves 0.33 m a substep, and would else pass
+            through what is thinner.
+    """
+    patterns = [
+        sensor for sensor in spec.sensors if sensor.name.startswith(_GROUND)
+    ]  # one a body, in the bodies' order
+    box = spec.worldbody.add_body(name=name, pos=[_ASIDE, 0.0, 0.5 * size[2]])
+    box.add_freejoint(name=name)
+    half = [0.5 * edge for edge in size]
+    box.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, name=name, size=half, mass=mass, rgba=rgba, condim=3, margin=margin)
+    for pattern in patterns:
+        spec.add_sensor(
+            name=f"{_HIT}{name}_{pattern.refname}",
+            type=mujoco.mjtSensor.mjSENS_CONTACT,
+            objtype=mujoco.mjtObj.mjOBJ_BODY,
+            objname=name,
+            reftype=mujoco.mjtObj.mjOBJ_BODY,
+            refname=pattern.refname,
+            intprm=pattern.intprm,
+        )
