@@ -53,7 +53,7 @@ class BodyTree:
             offset = level.offsets.to(qpos).unsqueeze(-1).unbind(0)
             pos[:, level.bodies] = pos[:, level.parents] + torch.stack(components_rotate(parent, offset))
             quat[:, level.bodies] = torch.stack(components_mul(parent, quat[:, level.bodies].unbind(0)))
-        return pos.permute(2, 1, 0).reshape(*shape, -1, 3), quat.permute(2, 1, 0).reshape(*shape, -1, 4)
+        return pos.permute(2, 1, 0).reshape(*shape, self._size, 3), quat.permute(2, 1, 0).reshape(*shape, self._size, 4)
 
     def _local_rotations(self, columns: Tensor) -> Tensor:
         """Rotation of each body in its parent [4, B, n], the root's in the world, of poses [nq, n]."""

@@ -1,7 +1,5 @@
 """What a task adds to the character: a goal, a reward in named terms, an end. A task knows nothing of agents."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import mujoco
@@ -9,24 +7,8 @@ import torch
 from torch import Tensor
 
 from murmillo.envs.character import Character
+from murmillo.envs.markers import Marker
 from murmillo.envs.physics import State
-
-
-@dataclass(frozen=True)
-class Marker:
-    """A coloured ball or arrow in a picture, which touches nothing.
-
-    Attributes:
-        pos_w: its place [m], three numbers.
-        direction_w: of an arrow, three numbers; None makes a ball.
-        size: radius of the ball, length of the arrow [m].
-        rgba: four numbers from 0 to 1.
-    """
-
-    pos_w: Sequence[float]
-    direction_w: Sequence[float] | None = None
-    size: float = 0.1
-    rgba: tuple[float, float, float, float] = (0.85, 0.2, 0.15, 0.8)
 
 
 class Task:
@@ -54,17 +36,21 @@ class Task:
     policies have 5)."""
 
     def edit(self, spec: mujoco.MjSpec) -> None:
-        """Add the task's props to the character's MJCF."""
+        """Add the task's props to the character's spec (`murmillo.envs.scene.add_box`)."""
 
     def bind(self, num_envs: int, character: Character) -> None:
         """Make room for the goals of N worlds; called once, before anything else."""
         self.num_envs, self.character = num_envs, character
 
     def reset(self, env_ids: Tensor, state: State, generator: torch.Generator) -> None:
-        """New goals for the worlds env_ids [n], whose new episodes begin in `state`."""
+        """New goals for the worlds env_ids [n], whose new episodes begin in `state`; props are put in place there."""
 
     def advance(self, state: State, generator: torch.Generator) -> None:
         """Let a control step pass: clocks run, and goals whose time is over are drawn anew."""
+
+    def push(self, state: State) -> Tensor | None:
+        """[N, 3] force on the root [N] throughout the coming step, in the world; None is none."""
+        return None
 
     def goal(self, state: State) -> Tensor:
         """[N, goal_dim] the goal as the policy sees it, in the heading frame."""
