@@ -61,15 +61,22 @@ class StartSampler:
     """Draws starts by the shares of `StartConfig`; reference starts come with a window of `window` states."""
 
     def __init__(
-        self, character: Character, library: MotionLibrary, config: StartConfig, num_envs: int, window: int
+        self,
+        character: Character,
+        library: MotionLibrary,
+        config: StartConfig,
+        num_envs: int,
+        window: int,
+        threads: int = 0,
     ) -> None:
+        """`threads` of the physics that makes the fallen states; 0 takes every CPU."""
         for name in ("recovery", "fallen", "reference"):
             if not 0.0 <= getattr(config, name) <= 1.0:
                 raise SuiteError(f"starts.{name}={getattr(config, name)}: needs a share between 0 and 1")
         if config.fallen_states < 1:
             raise SuiteError(f"starts.fallen_states={config.fallen_states}: needs at least 1")
         self.config = config
-        self._character = character
+        self._character, self._threads = character, threads
         self._references = _ReferenceStock(character, library, min(num_envs, _MOST_AHEAD), window)
         self._pool_size = min(config.fallen_states, max(16, num_envs))
         self._pool: Tensor | None = None
@@ -116,7 +123,7 @@ class StartSampler:
         """
         if self._pool is None:
             generator, n = torch.Generator().manual_seed(0), self._pool_size
-            physics = make_physics(self._character, n)
+            physics = make_physics(self._character, n, threads=self._threads)
             qpos = self._default.repeat(n, 1)
             low, high = self.config.drop_height
             qpos[:, 2] = low + (high - low) * torch.rand(n, generator=generator, dtype=torch.float64)

@@ -79,7 +79,9 @@ class HumanoidVectorEnv(VectorEnv):
         self.physics = make_physics(self.scene, num_envs, threads=config.threads)
         self.task.bind(num_envs, self.character)
         self._fallen = FallDetector(self.character, config.fall)
-        self._starts = StartSampler(self.character, self.library, config.starts, num_envs, config.window)
+        self._starts = StartSampler(
+            self.character, self.library, config.starts, num_envs, config.window, config.threads
+        )
         self._residual = _residual_forces(self.character, config)
         self._set_spaces()
         self._generator = torch.Generator()
