@@ -16,6 +16,7 @@ import murmillo.envs
 from murmillo.envs import EnvConfig, HumanoidEnv, HumanoidVectorEnv, SuiteError
 from murmillo.envs._opengl import HEADLESS
 from murmillo.envs.observations import character_state
+from murmillo.envs.tasks import TASKS
 
 ID = "murmillo/Imitation-v0"
 IDS = sorted(spec for spec in gymnasium.registry if spec.startswith("murmillo/"))
@@ -383,5 +384,5 @@ def test_a_window_without_a_screen_is_refused_in_one_line():
 
 
 def test_the_package_registers_every_id():
-    assert IDS == ["murmillo/Imitation-v0"]
+    assert sorted(f"murmillo/{name}-v0" for name in TASKS) == IDS
     assert murmillo.envs.__all__

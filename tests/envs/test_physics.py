@@ -9,8 +9,8 @@ from murmillo.envs.character import Character, load_character
 from murmillo.envs.errors import SuiteError
 from murmillo.envs.physics import make_physics
 from murmillo.envs.physics.cpu import CpuPhysics
-from murmillo.envs.scene import Scene
 from murmillo.envs.residual import ResidualForces
+from murmillo.envs.scene import Scene
 
 
 @pytest.fixture(scope="module")
