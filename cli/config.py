@@ -37,7 +37,8 @@ class RunConfig:
         root: folder of the runs.
         name: the run's folder in it; by default the time, the agent, the budget and the seed.
         resume: folder of a run to take up again, with its own settings.
-        measured_worlds: episodes that the policy is measured in at the end.
+        measured_worlds: episodes that the policy is measured in at the end, and trajectories of its evaluation.
+        evaluate: measure the quick metrics of `murmillo evaluate` at the end.
         video: film the trained character at the end.
     """
 
@@ -45,6 +46,7 @@ class RunConfig:
     name: str | None = None
     resume: str | None = None
     measured_worlds: int = 64
+    evaluate: bool = True
     video: bool = True
 
 

@@ -4,10 +4,13 @@ import math
 from typing import Any
 
 import torch
+from torch import Tensor
 
-from murmillo.cli.evaluate import AGES
+from murmillo.cli.rollouts import AGES
 from murmillo.envs import HumanoidVectorEnv
+from murmillo.envs.character import CONTROL_DT
 from murmillo.envs.metrics.latents import fisher_concentration
+from murmillo.envs.motion import MotionLibrary
 
 _EVERY = 0.2
 """[s] from one window of a clip to the next."""
@@ -20,8 +23,14 @@ def concentration(env: HumanoidVectorEnv, agent: Any) -> float | None:
     """
     if not hasattr(agent, "encode"):
         return None
-    library, frames = env.library, agent.encoder.frames
-    span = (frames - 1) * env.character.control_dt
+    found = fisher_concentration(*encode_clips(agent, env.library))
+    return found if math.isfinite(found) else None
+
+
+def encode_clips(agent: Any, library: MotionLibrary) -> tuple[Tensor, Tensor]:
+    """Encodings [n, Z] of windows that slide over the clips, and the clip [n] of each."""
+    frames = agent.encoder.frames
+    span = (frames - 1) * CONTROL_DT
     latents, clips = [], []
     for number, duration in enumerate(library.duration.tolist()):
         times = torch.arange(min(span, duration), duration + 1e-6, _EVERY, dtype=torch.float64)
@@ -29,8 +38,7 @@ def concentration(env: HumanoidVectorEnv, agent: Any) -> float | None:
         mask = None if library.mask is None else library.mask[clip]
         latents.append(agent.encode(library.window(clip, times, frames), mask))
         clips.append(clip)
-    found = fisher_concentration(torch.cat(latents), torch.cat(clips))
-    return found if math.isfinite(found) else None
+    return torch.cat(latents), torch.cat(clips)
 
 
 def section(measures: dict[str, Any]) -> str:

@@ -1,26 +1,31 @@
-"""`murmillo evaluate`: measure the policy of a run against itself before it was trained."""
+"""`murmillo evaluate`: what the papers measure, of a run, beside the clips, the untrained policy and the papers."""
 
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, Literal
 
 from murmillo.cli.errors import CommandError
 
-if TYPE_CHECKING:
-    from murmillo.cli.config import TrainConfig
-
 HELP = """\
-murmillo evaluate: measure a trained agent
+murmillo evaluate: measure a trained agent as the papers do
 
-  murmillo evaluate run=runs/<name>                  64 episodes; writes evaluation.json into the run's folder
+  murmillo evaluate run=runs/<name>                  the quick metrics, in a minute or two
+  murmillo evaluate run=runs/<name> metrics=all trajectories=10000
 
-  run       needed           folder of the run
-  worlds    64               episodes, one in each world, started in a clip and played with the policy's mean action
-  seed      12345            of the starts
-  motions   the run's own    a folder or file, where the clips have moved
+  run            needed           folder of the run
+  metrics        quick            quick, all, or some of: coverage, transitions, frechet, diversity, concentration,
+                                  inception, controllability, residual, quality, recovery; metrics=[coverage,frechet]
+  trajectories   256, or 1000     for each source and protocol; the papers have 1,000 (ASE) and 10,000 (C·ASE)
+  seed           12345            of all that is random
+  start          default          default or reference: a standing pose, or random moments of the clips
+  worlds         64               episodes that the policy is measured in before and after training, 0 for none
+  motions        the run's own    a folder or file, where the clips have moved; other clips are not comparable
+
+Writes evaluation.md, evaluation.html and evaluation/ into the run's folder. What is recorded stays there: the same
+command goes on where it was stopped. docs/metrics.md says how each metric is measured.
 """
 
-AGES = {"untrained": "before training", "warm_started": "after the warm start", "trained": "after training"}
+_QUICK_TRAJECTORIES = 256
+_TRAJECTORIES = 1000
 
 
 @dataclass
@@ -28,83 +33,63 @@ class EvaluateConfig:
     """What `murmillo evaluate` takes; see `HELP`."""
 
     run: str
-    worlds: int = 64
+    metrics: tuple[str, ...] = ("quick",)
+    trajectories: int | None = None
     seed: int = 12345
+    start: Literal["default", "reference"] = "default"
+    worlds: int = 64
     motions: str | None = None
 
 
 def run(words: list[str]) -> int:
-    """Measure, print a table and write `evaluation.json`."""
+    """Measure, print the figures and write the reports."""
     from murmillo.cli import config as configuration
     from murmillo.cli import runs
+    from murmillo.cli.evaluation.evaluating import Request, evaluate
     from murmillo.cli.seeds import check_seed
 
-    settings = configuration.parse(EvaluateConfig, words)
-    if settings.worlds < 1:
-        raise CommandError(f"worlds={settings.worlds}: needs at least 1")
+    settings = configuration.parse(EvaluateConfig, [_listed(word) for word in words])
+    trajectories = settings.trajectories
+    if trajectories is None:
+        trajectories = _QUICK_TRAJECTORIES if settings.metrics == ("quick",) else _TRAJECTORIES
+    if trajectories < 1:
+        raise CommandError(f"trajectories={trajectories}: needs at least 1")
+    if settings.worlds < 0:
+        raise CommandError(f"worlds={settings.worlds}: needs a number of episodes, or 0 for none")
     check_seed("seed", settings.seed)
+    if not settings.metrics:
+        raise CommandError("metrics=[]: name some, or quick or all")
     folder = runs.existing(settings.run, "run")
     config = configuration.load(folder)
-    config.env.motions = settings.motions or config.env.motions
-    ages = measure_ages(config, folder, settings.worlds, settings.seed)
-    runs.write_json(folder / runs.EVALUATION, {"seed": settings.seed, **ages})
-    _print(ages)
-    print(f"written: {folder / runs.EVALUATION}")
+    request = Request(settings.metrics, trajectories, settings.seed, settings.start, settings.worlds, settings.motions)
+    try:
+        results = evaluate(config, folder, request)
+    except KeyboardInterrupt:
+        print(f"stopped; what is recorded stays, go on with: murmillo evaluate {' '.join(words)}")
+        return 130
+    _print(results)
+    print(f"the report: {folder / runs.EVALUATED} (and {runs.EVALUATED_HTML}, {runs.METRICS})")
     return 0
 
 
-def measure_ages(config: "TrainConfig", folder: Path, worlds: int, seed: int = 12345) -> dict[str, dict[str, Any]]:
-    """Measures of the run's policy before training, after the warm start (where there was one) and after training.
-
-    The trained discriminator judges all three.
-
-    Raises:
-        AgentError: there is no checkpoint, or it does not fit.
-    """
-    import dataclasses
-
-    from murmillo.cli import runs
-    from murmillo.cli.agents import load_player, make_agent
-    from murmillo.cli.encodings import concentration
-    from murmillo.cli.rollouts import measure
-    from murmillo.envs import HumanoidVectorEnv
-
-    # only the first episodes count, which start in a clip: what comes after them need not be costly
-    starts = dataclasses.replace(config.env.starts, fallen=0.0)
-    env = HumanoidVectorEnv(worlds, dataclasses.replace(config.env, autoreset="same_step", starts=starts))
-    try:
-        made_of = (config.choices["agent"], config.agent, env, config.seed)
-        judge = load_player(*made_of, folder / runs.LAST)
-        players = {"untrained": make_agent(*made_of)[0]}
-        if (folder / runs.WARM_STARTED).exists():
-            players["warm_started"] = load_player(*made_of, folder / runs.WARM_STARTED)
-        players["trained"] = load_player(*made_of, folder / runs.LAST)
-        return {
-            age: measure(env, player, judge, seed).as_dict() | {"concentration": concentration(env, player)}
-            for age, player in players.items()
-        }
-    finally:
-        env.close()
+def _listed(word: str) -> str:
+    """One metric needs no brackets."""
+    name, _, value = word.partition("=")
+    return f"metrics=[{value}]" if name == "metrics" and value and not value.startswith("[") else word
 
 
-def _print(ages: dict[str, dict[str, Any]]) -> None:
-    """A row for each age; a column that no age has a figure for is left out."""
+def _print(results: dict[str, Any]) -> None:
     from murmillo.cli import tables
+    from murmillo.cli.ages import show_ages
+    from murmillo.cli.evaluation.report import figure_rows
 
-    columns = {
-        "policy": [AGES[age] for age in ages],
-        "episode length [steps]": [f"{m['length']:.1f}" for m in ages.values()],
-        "fall rate": [f"{m['fall_rate']:.2f}" for m in ages.values()],
-        "style score": [f"{m['score']:.3f}" for m in ages.values()],
-        "commanded skill's head": [_figure(m["heads"].get("right")) for m in ages.values()],
-        "other heads": [_figure(m["heads"].get("other")) for m in ages.values()],
-        "Fisher concentration": [_figure(m["concentration"]) for m in ages.values()],
-        "episodes": [f"{m['episodes']}" for m in ages.values()],
-        "steps": [f"{m['steps']}" for m in ages.values()],
-    }
-    columns = {title: cells for title, cells in columns.items() if any(cells)}
-    tables.show(tuple(columns), list(zip(*columns.values(), strict=True)), left=("policy",))
-
-
-def _figure(value: float | None) -> str:
-    return "" if value is None else f"{value:.3f}"
+    if "ages" in results:
+        show_ages(results["ages"])
+        print()
+    tables.show(
+        ("", "this run", "untrained", "clips replayed", "published"), figure_rows(results, spread=False), left=("",)
+    )
+    for name, reason in results["left_out"].items():
+        print(f"left out: {name}, {reason}")
+    if results["not_comparable"]:
+        print(f"not comparable: {results['not_comparable']}")

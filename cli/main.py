@@ -11,6 +11,7 @@ murmillo: simulated sword-and-shield fighters that learn skills from motion clip
 
   murmillo train      train an agent and leave a report, a video and checkpoints in runs/<name>/
   murmillo evaluate   measure a trained agent:       murmillo evaluate run=runs/<name>
+  murmillo compare    put runs side by side:         murmillo compare 'runs/*'
   murmillo record     film a trained agent:          murmillo record run=runs/<name>
   murmillo motions    import motion clips, look at them, label them
   murmillo doctor     look at this machine: versions, graphics, threads, GPU, speed
@@ -18,7 +19,7 @@ murmillo: simulated sword-and-shield fighters that learn skills from motion clip
 `murmillo <command> --help` says what a command takes. Settings are written name=value.
 """
 
-COMMANDS = ("train", "evaluate", "record", "motions", "doctor")
+COMMANDS = ("train", "evaluate", "compare", "record", "motions", "doctor")
 
 
 def main(argv: list[str] | None = None) -> int:

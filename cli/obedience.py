@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from murmillo.cli.evaluate import AGES
+from murmillo.cli.rollouts import AGES
 
 
 def section(measures: dict[str, Any], skills: dict[str, dict[str, float]]) -> str:

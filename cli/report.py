@@ -9,9 +9,10 @@ import numpy as np
 from omegaconf import OmegaConf
 
 from murmillo.cli import encodings, obedience, runs
-from murmillo.cli.evaluate import AGES
+from murmillo.cli.evaluation import report as evaluation
 from murmillo.cli.metrics import LABELS, TRAINING, Metric
 from murmillo.cli.plots import Scalars, plot_all
+from murmillo.cli.rollouts import AGES
 from murmillo.envs.motion.licences import Terms
 
 _MAX_ROWS = 12
@@ -31,6 +32,7 @@ def write(folder: Path) -> Path:
         _ages(measures),
         obedience.section(measures, runs.read_json(folder / runs.SKILLS, {})),
         encodings.section(measures),
+        evaluation.section(runs.read_json(folder / runs.METRICS)),
     ]
     if len(scalars["samples"]):
         plots = plot_all(scalars, folder / runs.PLOTS)
@@ -206,7 +208,7 @@ def _going_on(folder: Path, config: Any, scalars: Scalars) -> str:
     lines += [
         "# another film, and surer figures",
         f"murmillo record run={run} seconds=20",
-        f"murmillo evaluate run={run} worlds=256",
+        f"murmillo evaluate run={run} trajectories=1000",
         "# the curves of all runs, live",
         f"tensorboard --logdir {shlex.quote(str(folder.parent))}",
     ]

@@ -12,6 +12,9 @@ from murmillo.agents.common.interface import Agent, Labelled
 from murmillo.agents.common.rollout import Rollout, tensors, true_next_obs
 from murmillo.envs import HumanoidVectorEnv
 
+AGES = {"untrained": "before training", "warm_started": "after the warm start", "trained": "after training"}
+"""The ages of a policy that are measured, in words."""
+
 _HEAD = "head/"
 
 

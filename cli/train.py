@@ -22,6 +22,7 @@ Settings are written name=value. The first ones:
   num_envs   512                                     worlds that are simulated together
   threads    0                                       CPU threads; 0 takes every core
   run.name   by time, agent, budget and seed         folder of the run under run.root=runs
+  run.evaluate  true                                 measure the quick metrics of `murmillo evaluate` at the end
   run.video  true                                    film the trained character at the end
 
 `config.yaml` in the folder of a run shows every setting; each can be given here by its dotted name, such as

@@ -21,10 +21,13 @@ from murmillo.agents.common.warm_start import warm_start
 from murmillo.cli import config as configuration
 from murmillo.cli import report, runs, versions
 from murmillo.cli.agents import checkpoint_meta, make_agent
+from murmillo.cli.ages import measure_ages
 from murmillo.cli.checks import check_clips, check_settings
 from murmillo.cli.config import TrainConfig
 from murmillo.cli.errors import user_errors
-from murmillo.cli.evaluate import measure_ages
+from murmillo.cli.evaluation.evaluating import Request, evaluate
+from murmillo.cli.evaluation.identity import clip_digests
+from murmillo.cli.evaluation.table import QUICK
 from murmillo.cli.progress import Progress, make_progress
 from murmillo.envs import HumanoidVectorEnv
 from murmillo.envs.motion.licences import terms_of
@@ -97,6 +100,7 @@ def _train(config: TrainConfig, env: HumanoidVectorEnv, folder: Path, resuming: 
     terms = dataclasses.asdict(terms_of(env.library.clips))
     runner.meta |= {"terms": terms}  # after loading: they are kept with a checkpoint, and need not be those here
     runs.write_json(folder / runs.TERMS, terms)
+    runs.write_json(folder / runs.CLIPS, clip_digests(env.library.clips))
     progress = make_progress(config.runner.samples, runner.samples, config.runner.max_minutes)
     with progress, _stopping(runner.stop, progress) as stopped:
         progress.say(f"{folder}: {config.choices['agent']} on {len(env.library.clips)} clips, {config.num_envs} worlds")
@@ -170,9 +174,21 @@ def _finish(config: TrainConfig, folder: Path) -> None:
     """Measure the policy before and after training, film it, write the report."""
     print("measuring the policy before and after training", flush=True)
     runs.write_json(folder / runs.MEASURES, measure_ages(config, folder, config.run.measured_worlds))
+    if config.run.evaluate:
+        _evaluate(config, folder)
     if config.run.video:
         _film(folder)
     print(f"the report: {report.write(folder)}")
+
+
+def _evaluate(config: TrainConfig, folder: Path) -> None:
+    """Put the policy beside the clips and the papers; who interrupts this keeps the run and can take it up again."""
+    trajectories = config.run.measured_worlds
+    print(f"measuring what the papers measure: {trajectories} trajectories; Ctrl-C leaves this out", flush=True)
+    try:
+        evaluate(config, folder, Request((QUICK,), trajectories))
+    except KeyboardInterrupt:
+        print(f"left out; go on with: murmillo evaluate run={folder} trajectories={trajectories}")
 
 
 def _film(folder: Path) -> None:

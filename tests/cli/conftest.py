@@ -51,6 +51,7 @@ TINY = (
     "threads=1",
     "run.measured_worlds=2",
     "run.video=false",
+    "run.evaluate=false",
     "env.starts.fallen=0",
     "env.width=64",
     "env.height=48",

@@ -32,7 +32,7 @@ def test_trains_resumes_and_is_measured(agent: str, murmillo: Murmillo, folder: 
     assert AGENTS[agent].labelled == bool(measures["trained"]["heads"])
     assert AGENTS[agent].labelled == (folder / "runs/one/skills.json").exists()
     assert (agent == "calm") == (measures["trained"]["concentration"] is not None)
-    status, out, err = murmillo("evaluate", "run=runs/one", "worlds=2")
+    status, out, err = murmillo("evaluate", "run=runs/one", "worlds=2", "trajectories=1", "metrics=quality")
     assert status == 0, err
     assert ("Fisher concentration" in out) == (agent == "calm")
     assert ("commanded skill's head" in out) == AGENTS[agent].labelled

@@ -64,16 +64,6 @@ def test_resumed_run_equals_an_uninterrupted_one(murmillo: Murmillo, own_run: Pa
     assert resumed == whole
 
 
-def test_evaluate(murmillo: Murmillo, own_run: Path) -> None:
-    status, out, err = murmillo("evaluate", "run=runs/tiny", "worlds=4")
-    assert status == 0, err
-    assert "after training" in out
-    figures = json.loads((own_run / "evaluation.json").read_text())
-    assert figures["trained"]["episodes"] == 4
-    assert 0.0 < figures["trained"]["score"] < 1.0
-    assert figures["trained"]["length"] * 4 == pytest.approx(figures["trained"]["steps"])
-
-
 def test_a_checkpoint_of_another_character(murmillo: Murmillo, own_run: Path) -> None:
     meta = own_run / "checkpoints" / "last" / "meta.json"
     meta.write_text(meta.read_text().replace('"sword_shield"', '"centaur"'))
@@ -81,7 +71,7 @@ def test_a_checkpoint_of_another_character(murmillo: Murmillo, own_run: Path) ->
     assert status == 2
     assert "centaur" in err
     assert err.count("\n") == 1
-    assert not (own_run / "evaluation.json").exists()
+    assert not (own_run / "evaluation").exists()
 
 
 def test_multirun_trains_one_run_for_each_value(murmillo: Murmillo, folder: Path, tiny: tuple[str, ...]) -> None:

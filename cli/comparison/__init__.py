@@ -1,0 +1,1 @@
+"""What `murmillo compare` is made of: reading runs, grouping them, statistics over seeds, curves and the page."""
