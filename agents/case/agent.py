@@ -3,16 +3,14 @@
 from typing import Any
 
 import torch
-from gymnasium import spaces
 from gymnasium.vector import VectorEnv
 from torch import Tensor
 
 from murmillo.agents.case.config import CASEConfig
 from murmillo.agents.case.focal import FocalSampling
 from murmillo.agents.case.networks import Encoder, LabelEmbedding, SkillHeads
-from murmillo.agents.common.dimensions import dimensions
+from murmillo.agents.common.dimensions import dimensions, skill_count
 from murmillo.agents.common.discriminator import Discriminator, Windows, discriminator_loss, style_reward
-from murmillo.agents.common.errors import AgentError
 from murmillo.agents.common.interface import Demonstrations, Obs, Step
 from murmillo.agents.common.latents import LatentSequence, sample_sphere
 from murmillo.agents.common.masks import FeatureMasks
@@ -47,7 +45,7 @@ class CASE:
             AgentError: environment or demonstrations give no windows of `config.window` frames, or no labels.
         """
         state_dim, action_dim = dimensions(env, demonstrations, config.window)
-        labels = _labels(env)
+        labels = skill_count(env)
         self.config = config
         self.latent_dim = config.latent_dim
         self.demonstrations = demonstrations
@@ -232,12 +230,3 @@ class CASE:
         load_module(self.label, state["label"], "label embedding")
         load_parts(self._parts, state)
         self.iterations = state["iterations"]
-
-
-def _labels(env: VectorEnv) -> int:
-    """K, the labels that the environment may command."""
-    space = env.single_observation_space
-    skill = space.spaces.get("skill") if isinstance(space, spaces.Dict) else None
-    if not isinstance(skill, spaces.Discrete):
-        raise AgentError(f"C·ASE needs the label as a discrete observation 'skill'; the environment's is {skill}")
-    return int(skill.n)

@@ -8,6 +8,7 @@ import torch
 from torch import Tensor, nn
 
 from murmillo.agents.common.errors import AgentError
+from murmillo.agents.common.losses import action_bound_loss, gaussian_entropy, gaussian_log_prob
 
 
 def linear(inputs: int, outputs: int, generator: torch.Generator, bound: float | None = None) -> nn.Linear:
@@ -55,7 +56,11 @@ def style_mlp(latent_dim: int, hidden: Sequence[int], generator: torch.Generator
 
 
 class GaussianPolicy(nn.Module):
-    """pi(a | s, c) = N(mu(s, c), diag std^2) with a fixed std (ASE, section 8.2)."""
+    """pi(a | s, c) = N(mu(s, c), diag std^2) with a fixed std (ASE, section 8.2).
+
+    PPO knows a policy by its parameters, here the mean: `forward` gives them, the other methods are told them. A policy
+    of another kind of action overrides both.
+    """
 
     log_std: Tensor
 
@@ -94,5 +99,28 @@ class GaussianPolicy(nn.Module):
 
     def forward(self, state: Tensor, condition: Tensor | None = None) -> Tensor:
         """Mean action `[..., A]` of normalised states `[..., D]` under conditions `[..., C]`."""
-        inputs = state if condition is None else torch.cat([state, self.style(condition)], -1)
-        return self.head(self.trunk(inputs))
+        return self.head(self.features(state, condition))
+
+    def features(self, state: Tensor, condition: Tensor | None = None) -> Tensor:
+        """The last hidden layer `[..., H]`."""
+        return self.trunk(state if condition is None else torch.cat([state, self.style(condition)], -1))
+
+    def sample(self, parameters: Tensor, generator: torch.Generator) -> Tensor:
+        """Actions `[..., A]` drawn from the distributions with these parameters."""
+        return parameters + self.log_std.exp() * torch.randn(parameters.shape, generator=generator)
+
+    def mode(self, parameters: Tensor) -> Tensor:
+        """The likeliest actions `[..., A]`."""
+        return parameters
+
+    def log_prob(self, action: Tensor, parameters: Tensor) -> Tensor:
+        """Log probabilities `[...]` of actions `[..., A]`."""
+        return gaussian_log_prob(action, parameters, self.log_std)
+
+    def entropy(self, parameters: Tensor) -> Tensor:
+        """[nat], `[...]`, or one for all where it depends on no state."""
+        return gaussian_entropy(self.log_std)
+
+    def bound_loss(self, parameters: Tensor) -> Tensor:
+        """What keeps the means of parameters `[B, ...]` within [-1, 1]."""
+        return action_bound_loss(parameters)

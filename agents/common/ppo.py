@@ -10,15 +10,7 @@ from torch import Tensor, nn
 
 from murmillo.agents.common.advantages import normalise_advantage
 from murmillo.agents.common.errors import AgentError
-from murmillo.agents.common.losses import (
-    action_bound_loss,
-    approx_kl,
-    clip_fraction,
-    gaussian_entropy,
-    gaussian_log_prob,
-    ppo_policy_loss,
-    value_loss,
-)
+from murmillo.agents.common.losses import approx_kl, clip_fraction, ppo_policy_loss, value_loss
 from murmillo.agents.common.networks import GaussianPolicy, linear, mlp
 from murmillo.agents.common.normalizer import RunningNormalizer
 from murmillo.agents.common.rollout import Rollout
@@ -67,10 +59,17 @@ class ActorCritic(nn.Module):
     """
 
     def __init__(
-        self, state_dim: int, action_dim: int, condition_dim: int, config: PPOConfig, generator: torch.Generator
+        self,
+        state_dim: int,
+        action_dim: int,
+        condition_dim: int,
+        config: PPOConfig,
+        generator: torch.Generator,
+        policy: GaussianPolicy | None = None,
     ) -> None:
+        """`policy` takes the place of the Gaussian one that the config describes."""
         super().__init__()
-        self.policy = GaussianPolicy(
+        self.policy = policy or GaussianPolicy(
             state_dim,
             action_dim,
             config.hidden,
@@ -91,11 +90,9 @@ class ActorCritic(nn.Module):
         self, state: Tensor, condition: Tensor | None, generator: torch.Generator, deterministic: bool = False
     ) -> tuple[Tensor, Tensor]:
         """Actions `[N, A]` and their log probabilities `[N]` for raw states `[N, D]`."""
-        mean = self.policy(self.state_normalizer(state), condition)
-        action = mean
-        if not deterministic:
-            action = mean + self.policy.log_std.exp() * torch.randn(mean.shape, generator=generator)
-        return action, gaussian_log_prob(action, mean, self.policy.log_std)
+        parameters = self.policy(self.state_normalizer(state), condition)
+        action = self.policy.mode(parameters) if deterministic else self.policy.sample(parameters, generator)
+        return action, self.policy.log_prob(action, parameters)
 
     @torch.no_grad()
     def value(self, state: Tensor, condition: Tensor | None) -> Tensor:
@@ -148,7 +145,8 @@ class PPO:
             generator: draws the minibatches.
             fields: further fields that the minibatches carry to `condition` and `extra_loss`.
             condition: what policy and critic are told, `[B, C]`, from a minibatch; gradients flow into it.
-            extra_loss: further weighted losses of the policy by name, from a minibatch and the means `[B, A]`.
+            extra_loss: further weighted losses of the policy by name, from a minibatch and the policy's parameters
+                `[B, P]`, a Gaussian's means.
 
         Returns:
             means of the losses, the KL divergence [nat], the clipped share and the entropy [nat].
@@ -186,20 +184,20 @@ class PPO:
         condition: Tensor | None,
         extra_loss: Callable[[Minibatch, Tensor], Mapping[str, Tensor]],
     ) -> tuple[dict[str, Tensor], dict[str, Tensor]]:
-        config, log_std = self.config, self.model.policy.log_std
-        mean = self.model.policy(batch["state"], condition)
-        log_prob = gaussian_log_prob(batch["action"], mean, log_std)
+        config, policy = self.config, self.model.policy
+        parameters = policy(batch["state"], condition)
+        log_prob = policy.log_prob(batch["action"], parameters)
         losses = {
             "policy": ppo_policy_loss(log_prob, batch["log_prob"], batch["advantage"], config.clip),
-            "bound": config.bound_weight * action_bound_loss(mean),
-            **extra_loss(batch, mean),
+            "bound": config.bound_weight * policy.bound_loss(parameters),
+            **extra_loss(batch, parameters),
             "value": value_loss(self.model.normalised_value(batch["state"], condition), batch["target"]),
         }
         with torch.no_grad():
             scores = {
                 "kl": approx_kl(log_prob, batch["log_prob"]),
                 "clipped": clip_fraction(log_prob, batch["log_prob"], config.clip),
-                "entropy": gaussian_entropy(log_std),
+                "entropy": policy.entropy(parameters).mean(),
             }
         return losses, scores
 

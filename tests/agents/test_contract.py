@@ -1,4 +1,7 @@
-"""What the runner may ask of every agent. A new agent joins with one line in `AGENTS`."""
+"""What the runner may ask of every agent, and more of those that act under latents and have a discriminator.
+
+A new agent joins with one line in `LOW_LEVEL` or `AGENTS`.
+"""
 
 import copy
 import dataclasses
@@ -15,14 +18,29 @@ from murmillo.agents.common.interface import Agent, Steerable
 from murmillo.agents.common.rollout import Rollout, tensors, true_next_obs
 from murmillo.agents.common.runner import Runner
 from tests.agents.toy import PointMass, equal, make_ase, make_calm, make_case, make_runner, small_ase
+from tests.agents.toy_tasks import make_commanded, make_task
 
 Maker = Callable[..., Agent]
-AGENTS: dict[str, Maker] = {"ase": make_ase, "calm": make_calm, "case": make_case}
+LOW_LEVEL: dict[str, Maker] = {"ase": make_ase, "calm": make_calm, "case": make_case}
+AGENTS: dict[str, Maker] = {**LOW_LEVEL, "task": make_task, "commanded": make_commanded}
+REWARDS = {
+    "ase": {"style": 1.0, "skill": 0.5},
+    "calm": {"style": 1.0},
+    "case": {"style": 1.0, "skill": 0.5},
+    "task": {"task": 1.0},
+    "commanded": {"task": 1.0},
+}
+"""What each counts on."""
 HORIZON = 9
 
 
 @pytest.fixture(params=list(AGENTS.values()), ids=list(AGENTS))
 def make(request: pytest.FixtureRequest) -> Maker:
+    return request.param
+
+
+@pytest.fixture(params=list(LOW_LEVEL.values()), ids=list(LOW_LEVEL))
+def make_low(request: pytest.FixtureRequest) -> Maker:
     return request.param
 
 
@@ -51,7 +69,8 @@ def collected(agent: Agent, env: PointMass) -> Rollout:
 def values(agent: Agent, env: PointMass, rollout: Rollout) -> torch.Tensor:
     """[T, N] of the rollout's states, under what acted in them."""
     extras = agent.act(tensors(env.reset(seed=0)[0])).extras
-    return agent.value({"state": rollout["state"]}, {name: rollout[name] for name in extras})
+    obs = {name: rollout[name] for name in agent.needs if not name.startswith("next_")}
+    return agent.value(obs, {name: rollout[name] for name in extras})
 
 
 @pytest.mark.parametrize("num_envs", [1, 17])
@@ -91,9 +110,9 @@ def test_deterministic_actions_are_the_mean_and_draw_no_noise(make: Maker, gener
     assert torch.equal(first.action, agent.act(obs, deterministic=True).action)
 
 
-def test_a_reset_begins_anew_in_its_worlds_only(make: Maker, generator: torch.Generator) -> None:
+def test_a_reset_begins_anew_in_its_worlds_only(make_low: Maker, generator: torch.Generator) -> None:
     env = PointMass(30)
-    agent = make(env, generator, latent_steps=(50, 50))
+    agent = make_low(env, generator, latent_steps=(50, 50))
     obs = tensors(env.reset(seed=0)[0])
     before = agent.act(obs).extras["latent"]
     agent.reset(torch.arange(10))
@@ -102,9 +121,9 @@ def test_a_reset_begins_anew_in_its_worlds_only(make: Maker, generator: torch.Ge
     assert not changed[10:].any()
 
 
-def test_latents_that_are_followed_stay_until_the_reset(make: Maker, generator: torch.Generator) -> None:
+def test_latents_that_are_followed_stay_until_the_reset(make_low: Maker, generator: torch.Generator) -> None:
     env = PointMass(5)
-    agent = make(env, generator)
+    agent = make_low(env, generator)
     assert isinstance(agent, Steerable)
     obs = tensors(env.reset(seed=0)[0])
     asked = agent.draw_latents(5)
@@ -120,11 +139,12 @@ def test_latents_that_are_followed_stay_until_the_reset(make: Maker, generator: 
     assert same.tolist() == [True, False, True, False, True]
 
 
-def test_rewards_have_the_rollouts_shape(make: Maker, skills: int, generator: torch.Generator) -> None:
+@pytest.mark.parametrize("name", AGENTS)
+def test_rewards_have_the_rollouts_shape(name: str, skills: int, generator: torch.Generator) -> None:
     env = PointMass(13, skills=skills)
-    agent = make(env, generator)
+    agent = AGENTS[name](env, generator)
     terms = agent.rewards(collected(agent, env))
-    assert terms
+    assert set(terms) == set(REWARDS[name]) - {"task"}
     for term in terms.values():
         assert term.shape == (HORIZON, 13)
         assert term.isfinite().all()
@@ -145,18 +165,18 @@ def test_an_update_moves_the_policy_and_reports_finite_numbers(
     assert not torch.equal(before, values(agent, env, rollout))
 
 
-def test_the_discriminator_remembers_earlier_iterations(make: Maker, generator: torch.Generator) -> None:
+def test_the_discriminator_remembers_earlier_iterations(make_low: Maker, generator: torch.Generator) -> None:
     env = PointMass(15)
-    agent = make(env, generator, discriminator=small_ase().discriminator)
+    agent = make_low(env, generator, discriminator=small_ase().discriminator)
     first, second = (agent.update(collected(agent, env)) for _ in range(2))
     assert first["discriminator/replay"] == pytest.approx(first["discriminator/agent"])  # nothing to remember yet
     assert second["discriminator/replay"] != pytest.approx(second["discriminator/agent"], rel=1e-3)
 
 
-def test_the_discriminators_scale_is_that_of_clips_and_agent(make: Maker, generator: torch.Generator) -> None:
+def test_the_discriminators_scale_is_that_of_clips_and_agent(make_low: Maker, generator: torch.Generator) -> None:
     """From the clips before the first judgement, from both after each update."""
     env = PointMass(15)
-    agent: Any = make(env, generator)
+    agent: Any = make_low(env, generator)
     clips = agent.config.discriminator.minibatch * env.window
     normalizer = agent.discriminator.normalizer
     assert normalizer.count == clips
@@ -181,8 +201,8 @@ def test_state_survives_a_checkpoint_and_goes_on_alike(
     assert torch.equal(agent.act(obs).action, other.act(obs).action)
 
 
-def test_a_state_that_lacks_a_part_is_refused_in_one_line(make: Maker, generator: torch.Generator) -> None:
-    agent = make(PointMass(3), generator)
+def test_a_state_that_lacks_a_part_is_refused_in_one_line(make_low: Maker, generator: torch.Generator) -> None:
+    agent = make_low(PointMass(3), generator)
     state = agent.state_dict()
     del state["optimizer"], state["latents"]
     with pytest.raises(AgentError, match="the checkpoint has no latents, optimizer") as error:
@@ -190,11 +210,11 @@ def test_a_state_that_lacks_a_part_is_refused_in_one_line(make: Maker, generator
     assert "\n" not in str(error.value)
 
 
-def test_n_and_n_more_iterations_are_2n_bit_for_bit(make: Maker, tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", AGENTS)
+def test_n_and_n_more_iterations_are_2n_bit_for_bit(name: str, tmp_path: Path) -> None:
     def runner(folder: Path, iterations: int, seed: int = 0) -> Runner:
-        weights = {"style": 1.0} if make is make_calm else {"style": 1.0, "skill": 0.5}
-        samples = iterations * 32 * 8
-        return make_runner(folder, make=make, skills=3, seed=seed, samples=samples, reward_weights=weights)
+        samples, weights = iterations * 32 * 8, REWARDS[name]
+        return make_runner(folder, make=AGENTS[name], skills=3, seed=seed, samples=samples, reward_weights=weights)
 
     runner(tmp_path / "whole", 4).run()
     runner(tmp_path / "half", 2).run()
