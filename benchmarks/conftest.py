@@ -24,6 +24,7 @@ class Figure:
         note: under which conditions.
         of_bare: rate over that of bare `mj_step` in the same round: median and range.
         ours_over_it: rate of our environment over this one in the same round: median and range.
+        of_ase: rate over ASE's in the same round: median and range.
     """
 
     name: str
@@ -31,6 +32,7 @@ class Figure:
     note: str = ""
     of_bare: str = ""
     ours_over_it: str = ""
+    of_ase: str = ""
 
 
 FIGURES: list[Figure] = []
@@ -65,8 +67,8 @@ def markdown(figures: list[Figure]) -> str:
     lines = [
         f"{platform.machine()}, {os.cpu_count()} CPUs, Python {platform.python_version()}, {packages}",
         "",
-        "| what | a second | of bare `mj_step` | ours over it | note |",
-        "|---|---:|---:|---:|---|",
+        "| what | a second | of bare `mj_step` | ours over it | of ASE's | note |",
+        "|---|---:|---:|---:|---:|---|",
     ]
-    lines += [f"| {f.name} | {f.rate:,.0f} | {f.of_bare} | {f.ours_over_it} | {f.note} |" for f in figures]
+    lines += [f"| {f.name} | {f.rate:,.0f} | {f.of_bare} | {f.ours_over_it} | {f.of_ase} | {f.note} |" for f in figures]
     return "\n".join(lines)

@@ -1,4 +1,4 @@
-"""The environment against bare physics and other people's environments, in turns, so that all meet the same machine.
+"""What is compared runs in turns, so that all meet the same machine: environments with each other, agents with ASE.
 
 A shared machine's speed drifts by more than what is compared: each round lets every contestant run for a second, and
 the ratios are taken within the rounds. A control step of this character is four substeps of 1/120 s; Gymnasium's and
@@ -19,7 +19,7 @@ import pytest
 import torch
 
 from benchmarks.conftest import BARE, Figure
-from benchmarks.workload import NOISE, WARM_UP, BareSimulation, make_env, noise
+from benchmarks.workload import NOISE, WARM_UP, BareSimulation, iterate, make_env, make_runner, noise
 
 WORLDS = 1024
 ROUNDS = 9
@@ -116,6 +116,26 @@ def test_side_by_side(benchmark: Any, contestants: list[Ours | Foreign], record:
         factors = sorted(turn[ENVIRONMENT] / turn[name] for turn in rounds)
         note = f"{WORLDS} worlds" if name in (ENVIRONMENT, "physics step") else ""
         record(Figure(name, median(turn[name] for turn in rounds), note, _spread(shares), _spread(factors)))
+
+
+def test_training_side_by_side(benchmark: Any, record: Callable[[Figure], None]) -> None:
+    """An iteration of each agent in turn, with the networks of `smoke`, which are the same."""
+    runners = {agent: make_runner("smoke", f"agent={agent}") for agent in ("ase", "case", "calm")}
+    rounds: list[dict[str, float]] = []
+
+    def one() -> None:
+        rates = {}
+        for agent, runner in runners.items():
+            begin = time.perf_counter()
+            iterate(runner)
+            rates[agent] = runner.env.num_envs * runner.config.horizon / (time.perf_counter() - begin)
+        rounds.append(rates)
+
+    benchmark.pedantic(one, rounds=5, iterations=1, warmup_rounds=1)
+    for agent in runners:
+        ratios = sorted(turn[agent] / turn["ase"] for turn in rounds[1:])
+        rate = median(turn[agent] for turn in rounds[1:])
+        record(Figure(f"training iteration, {agent}, smoke", rate, "samples", of_ase=_spread(ratios)))
 
 
 def _spread(ratios: list[float]) -> str:

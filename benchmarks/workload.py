@@ -40,6 +40,15 @@ def make_runner(budget: str, *settings: str, num_envs: int | None = None) -> Run
     return Runner(env, agent, config.runner, generator, "benchmarks/results/checkpoint")
 
 
+def iterate(runner: Runner) -> None:
+    """One iteration of training, without log and checkpoint."""
+    runner._direct()
+    rollout = runner._collect()
+    runner._reward(rollout)
+    runner._advantage(rollout)
+    runner.agent.update(rollout)
+
+
 def noise(shape: tuple[int, ...], seed: int) -> np.ndarray:
     return np.random.default_rng(seed).uniform(-NOISE, NOISE, shape).astype(np.float32)
 

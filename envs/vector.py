@@ -237,14 +237,14 @@ class HumanoidVectorEnv(VectorEnv):
         """Windows of the clips, made by the function that makes the observations.
 
         They end at any time of a clip, and repeat its first frame where they begin before it. If their length is asked
-        for with `frames`, they lie within their clips as far as those are long enough.
+        for with `frames`, they lie within their clips as far as those are long enough, and end at one of their frames.
 
         Returns:
             window: [n, W, 120]; skill: [n] their labels; of the skills [n] asked for, or by the clips' weights. Where
             clips were made without a sword or a shield, also mask: [n, 120] bool, true for features that are made up.
         """
         span = 0.0 if frames is None else (frames - 1) * self.character.control_dt
-        clip, time = self.library.sample(n, generator, skill, span)
+        clip, time = self.library.sample(n, generator, skill, span, on_frames=frames is not None)
         window = self.library.window(clip, time, frames or self.config.window)
         drawn = {"window": window, "skill": self.library.clip_skill[clip]}
         return drawn if self.library.mask is None else drawn | {"mask": self.library.mask[clip]}

@@ -36,9 +36,8 @@ class MotionSequence:
             encode: gives their latents [n, Z].
         """
         self._draw, self._encode = draw, encode
-        # all motions that were followed since `forget`; a rollout speaks of them by their rows
-        self._window = torch.zeros(0)
-        self._masks: Tensor | None = None
+        # all motions that were followed since `forget`, as they came; a rollout speaks of them by their rows
+        self._followed: list[Windows] = []
         self._number = torch.zeros(num_envs, dtype=torch.int64)
         self._latents = LatentSequence(num_envs, latent_dim, generator, *steps, draw=self._begin)
 
@@ -56,15 +55,16 @@ class MotionSequence:
 
     def of(self, numbers: Tensor) -> Windows:
         """The motions [n, F, D] of these numbers [n], which `forget` and `encode_again` give out anew."""
-        return select(Windows(self._window, mask=self._masks), numbers)
+        return select(self._all(), numbers)
 
     def mask(self, numbers: Tensor) -> Tensor | None:
         """What these motions [n] leave out, [n, D] bool; None where no motion leaves anything out."""
-        return None if self._masks is None else self._masks[numbers]
+        masks = [motions.mask for motions in self._followed if motions.mask is not None]
+        return torch.cat(masks)[numbers] if masks else None
 
     def forget(self) -> None:
         """Forget the motions that no world follows any more; the numbers given out so far are void."""
-        if len(self._window) > len(self._number):
+        if sum(len(motions.window) for motions in self._followed) > len(self._number):
             self._keep(self.of(self._number))
 
     @torch.no_grad()
@@ -76,14 +76,20 @@ class MotionSequence:
     @torch.no_grad()
     def _begin(self, env_ids: Tensor) -> Tensor:
         new = self._draw(len(env_ids))
-        self._number[env_ids] = len(self._window) + torch.arange(len(env_ids))
-        self._window = torch.cat([self._window, new.window]) if len(self._window) else new.window
-        if new.mask is not None:
-            self._masks = new.mask if self._masks is None else torch.cat([self._masks, new.mask])
+        known = sum(len(motions.window) for motions in self._followed)
+        self._number[env_ids] = known + torch.arange(len(env_ids))
+        self._followed.append(new)
         return self._encode(new)
 
+    def _all(self) -> Windows:
+        """The motions behind all numbers, in one piece."""
+        if len(self._followed) > 1:
+            windows = torch.cat([motions.window for motions in self._followed])
+            self._followed = [Windows(windows, mask=self.mask(torch.arange(len(windows))))]
+        return self._followed[0]
+
     def _keep(self, followed: Windows) -> None:
-        self._window, self._masks = followed.window, followed.mask
+        self._followed = [followed]
         self._number = torch.arange(len(self._number))
 
     def state_dict(self) -> dict[str, Any]:

@@ -52,19 +52,28 @@ class MotionLibrary:
         self._qvel = torch.cat(velocities).to(self.device, torch.float32)
         self._quat_columns = [slice(3, 7), *(joint.qpos for joint in character.joints if joint.kind == "ball")]
         self._quat = torch.stack([self._qpos[:, columns] for columns in self._quat_columns], dim=1)
+        self._steps = _frames_of_a_step([clip.fps for clip in clips], self.device)
+        self._features: Tensor | None = None
         self._by_skill = torch.argsort(self.clip_skill, stable=True)
         self._cumulative = torch.cumsum(self.weight[self._by_skill], 0)
         counts = torch.bincount(self.clip_skill, minlength=len(self.skills))
         self._skill_ends = torch.cat((torch.zeros_like(counts[:1]), torch.cumsum(counts, 0)))
 
     def sample(
-        self, n: int, generator: torch.Generator, skill: Tensor | None = None, span: float = 0.0
+        self,
+        n: int,
+        generator: torch.Generator,
+        skill: Tensor | None = None,
+        span: float = 0.0,
+        *,
+        on_frames: bool = False,
     ) -> tuple[Tensor, Tensor]:
         """Draw n moments: a clip by its weight, a time uniform in its duration.
 
         Args:
             skill: [n] int64 indices into `skills`; each draw is then among the clips of its skill.
             span: [s] that the clip has behind it at each moment, or all that it has where it is shorter.
+            on_frames: the time is that of the clip's frame before, of which `window` has the features at hand.
 
         Returns:
             clip [n] int64 and time [n] float64 [s].
@@ -87,7 +96,10 @@ class MotionLibrary:
         index = torch.searchsorted(self._cumulative, point, right=True)
         clip = self._by_skill[torch.minimum(torch.maximum(index, first), after - 1)]
         first_time = self.duration[clip].clamp_max(span)
-        return clip, first_time + v * (self.duration[clip] - first_time)
+        time = first_time + v * (self.duration[clip] - first_time)
+        if on_frames:
+            time = (time * self._fps[clip] + _ON_FRAME).floor() / self._fps[clip]
+        return clip, time
 
     def pose(self, clip: Tensor, time: Tensor) -> tuple[Tensor, Tensor]:
         """Poses and velocities at these moments.
@@ -141,8 +153,30 @@ class MotionLibrary:
         Returns:
             [n, frames, 120] float32, oldest first. Before the clip begins its first frame is repeated.
         """
+        if (known := self._known_window(clip, time, frames)) is not None:
+            return known
         back = torch.arange(frames - 1, -1, -1, dtype=torch.float64, device=self.device) * CONTROL_DT
         times = time.double().unsqueeze(-1) - back
         qpos, qvel = self.pose(clip.repeat_interleave(frames), times.flatten())
         state = character_state(self.character, qpos, qvel, self.character.key_positions(qpos))
         return state.unflatten(0, (len(clip), frames))
+
+    def _known_window(self, clip: Tensor, time: Tensor, frames: int) -> Tensor | None:
+        """The window where all its moments are frames of the clips, out of features made once; else None."""
+        frame = time.double() * self._fps[clip]
+        nearest = frame.round()
+        if self._steps is None or ((frame - nearest).abs() > _ON_FRAME).any():
+            return None
+        if self._features is None:
+            state = character_state(self.character, self._qpos, self._qvel, self.character.key_positions(self._qpos))
+            self._features = state
+        back = torch.arange(frames - 1, -1, -1, device=self.device) * self._steps[clip].unsqueeze(-1)
+        last = torch.minimum(nearest.long() + self._first[clip], self._last[clip]).unsqueeze(-1)
+        return self._features[torch.maximum(last - back, self._first[clip].unsqueeze(-1))]
+
+
+def _frames_of_a_step(fps: Sequence[float], device: torch.device) -> Tensor | None:
+    """[C] frames of each clip in a control step; None where one of them has no whole number."""
+    ratios = torch.tensor(fps, dtype=torch.float64, device=device) * CONTROL_DT
+    whole = ratios.round()
+    return whole.long() if ((ratios - whole).abs() < 1e-9).all() and (whole >= 1).all() else None

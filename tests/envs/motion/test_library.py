@@ -172,3 +172,26 @@ def test_the_middle_of_a_clip(make_clip, character):
     torch.testing.assert_close(window[1:], library.window(torch.tensor([0]), library.duration[:1], 31))
     with pytest.raises(MotionError, match="clip lang: there is none of that name; near it are: long"):
         library.middle(["lang"], 31)
+
+
+def test_windows_on_frames_are_those_of_the_poses(make_clip, character):
+    """Features made once, for clips of 30, 60 and 120 Hz; the same moments a hair off the frames are reckoned anew."""
+    clips = [make_clip(f"clip {fps}", frames=fps, seed=fps, fps=float(fps)) for fps in (30, 60, 120)]
+    library = MotionLibrary(clips, character)
+    clip, time = library.sample(200, random(), span=0.2, on_frames=True)
+    frame = time * torch.tensor([30.0, 60.0, 120.0], dtype=torch.float64)[clip]
+    torch.testing.assert_close(frame, frame.round(), atol=1e-9, rtol=0)
+    assert (time >= 0.2 - 1e-9).all()
+    assert len(time.unique()) > 20
+    known = library.window(clip, time, 9)
+    assert library._features is not None
+    back = torch.arange(8, -1, -1, dtype=torch.float64) / 30
+    poses = library.pose(clip.repeat_interleave(9), (time[:, None] - back).flatten())
+    reckoned = character_state(character, *poses, character.key_positions(poses[0])).unflatten(0, (200, 9))
+    torch.testing.assert_close(known, reckoned, atol=1e-5, rtol=0)
+
+
+def test_clips_of_odd_rates_have_no_windows_at_hand(library):
+    clip, time = library.sample(20, random(), on_frames=True)
+    library.window(clip, time, 3)
+    assert library._features is None
