@@ -8,6 +8,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from murmillo.cli.errors import CommandError
 from murmillo.cli.evaluation.chunks import ChunkStore
 from murmillo.cli.evaluation.digests import Digest, digest
 from murmillo.cli.evaluation.display import make_display
@@ -64,12 +65,21 @@ def gather(
 
 
 def collect(store: ChunkStore, source: str, protocol: Protocol, trajectories: int) -> tuple[Digest, int]:
-    """The digests of all trajectories without those that diverged, and how many did."""
+    """The digests of all trajectories without those that diverged, and how many did.
+
+    Raises:
+        CommandError: all of them did.
+    """
     chunks = range(_chunks(protocol, trajectories, store.size))
     parts = [store.load(source, protocol.name, number) for number in chunks]
     n = protocol.trajectories(trajectories)
     whole = {name: torch.cat([part[name] for part in parts])[:n] for name in parts[0]}
     healed = whole.pop("healed")
+    if healed.all():
+        raise CommandError(
+            f"trajectories={trajectories}: the simulation diverged in every one of {SOURCES[source]}, "
+            f"{protocol.name}; ask for more, or for another seed"
+        )
     return {name: value[~healed] for name, value in whole.items()}, int(healed.sum())
 
 

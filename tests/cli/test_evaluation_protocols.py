@@ -7,6 +7,7 @@ import pytest
 import torch
 from torch import Tensor
 
+from murmillo.cli.errors import CommandError
 from murmillo.cli.evaluation.chunks import ChunkStore
 from murmillo.cli.evaluation.commands import Commander
 from murmillo.cli.evaluation.digests import digest
@@ -170,3 +171,14 @@ def test_a_push_throws_the_character_over(env: HumanoidVectorEnv, scene: Scene) 
     kept = digest(pushed, push, scene.matcher, len(scene.library.clips))
     assert kept["root_height"].shape == kept["fallen"].shape == (4, 30)
     assert torch.equal(kept["root_height"][:, 0], pushed.root_pos_w[:, 11, 2])
+
+
+def test_trajectories_that_diverged_are_left_out_and_not_all_may() -> None:
+    store = SimpleNamespace(size=3)
+    store.load = lambda *_: {"healed": torch.tensor([False, True, False]), "value": torch.tensor([1.0, 2.0, 3.0])}
+    digests, left_out = collect(store, REPLAYED, HELD, 3)  # type: ignore[arg-type]
+    assert digests["value"].tolist() == [1.0, 3.0]
+    assert left_out == 1
+    store.load = lambda *_: {"healed": torch.ones(3, dtype=torch.bool), "value": torch.zeros(3)}
+    with pytest.raises(CommandError, match="diverged in every one of clips replayed, held"):
+        collect(store, REPLAYED, HELD, 3)  # type: ignore[arg-type]
