@@ -54,15 +54,15 @@ def train(config: TrainConfig, suffix: str = "") -> int:
     try:
         if not resuming:
             runs.make(folder)
-        with _undone_by_mistakes(folder, resuming):
-            _describe(folder, config)
+        with undone_by_mistakes(folder, resuming):
+            describe(folder, config)
             return _train(config, env, folder, resuming)
     finally:
         env.close()
 
 
 @contextmanager
-def _undone_by_mistakes(folder: Path, resuming: bool) -> Iterator[None]:
+def undone_by_mistakes(folder: Path, resuming: bool) -> Iterator[None]:
     """A mistake that shows only now takes a new run's folder away, and gives a resumed one its own settings back."""
     former = {name: (folder / name).read_bytes() for name in (runs.CONFIG, runs.VERSIONS) if (folder / name).exists()}
     try:
@@ -76,7 +76,7 @@ def _undone_by_mistakes(folder: Path, resuming: bool) -> Iterator[None]:
         raise
 
 
-def _describe(folder: Path, config: TrainConfig) -> None:
+def describe(folder: Path, config: Any) -> None:
     """Write the settings and versions; those of a resumed run take the place of its former ones."""
     kept = dataclasses.replace(config, run=dataclasses.replace(config.run, resume=None))
     configuration.save(kept, folder)
@@ -102,7 +102,7 @@ def _train(config: TrainConfig, env: HumanoidVectorEnv, folder: Path, resuming: 
     runs.write_json(folder / runs.TERMS, terms)
     runs.write_json(folder / runs.CLIPS, clip_digests(env.library.clips))
     progress = make_progress(config.runner.samples, runner.samples, config.runner.max_minutes)
-    with progress, _stopping(runner.stop, progress) as stopped:
+    with progress, stopping(runner.stop, progress) as stopped:
         progress.say(f"{folder}: {config.choices['agent']} on {len(env.library.clips)} clips, {config.num_envs} worlds")
         if not resuming:
             _warm_start(config, agent, env, generator, progress, folder)
@@ -144,14 +144,16 @@ def _warm_start(
     if config.warm_start.steps == 0:
         return
     progress.say(f"warm start: {config.warm_start.steps} steps on the clips' own next poses")
-    losses = warm_start(agent.model, env.imitation_pairs, config.warm_start, generator, agent.random_condition)
+    losses = warm_start(
+        agent.model, env.demonstrations.imitation_pairs, config.warm_start, generator, agent.random_condition
+    )
     progress.say(f"warm start: squared error of the action from {losses[0]:.4f} to {losses[-1]:.4f}")
     meta = {**checkpoint_meta(config.choices["agent"], config.agent, env), "terms": runs.read_json(folder / runs.TERMS)}
     checkpoint.save(folder / runs.WARM_STARTED, {"meta": meta, "agent": agent.state_dict()})
 
 
 @contextmanager
-def _stopping(stop: Callable[[], None], progress: Progress) -> Iterator[Callable[[], bool]]:
+def stopping(stop: Callable[[], None], progress: Progress) -> Iterator[Callable[[], bool]]:
     """SIGINT and SIGTERM end the run after the iteration under way; a second SIGINT breaks it off."""
     signals: list[int] = []
 
@@ -177,7 +179,7 @@ def _finish(config: TrainConfig, folder: Path) -> None:
     if config.run.evaluate:
         _evaluate(config, folder)
     if config.run.video:
-        _film(folder)
+        film(folder)
     print(f"the report: {report.write(folder)}")
 
 
@@ -191,7 +193,7 @@ def _evaluate(config: TrainConfig, folder: Path) -> None:
         print(f"left out; go on with: murmillo evaluate run={folder} trajectories={trajectories}")
 
 
-def _film(folder: Path) -> None:
+def film(folder: Path) -> None:
     """Record in a process of its own: no graphics driver can then harm the run. One line says why there is no film."""
     command = [sys.executable, "-m", "murmillo.cli.main", "record", f"run={folder}", f"seconds={FILM_S}"]
     done = subprocess.run(command, capture_output=True, text=True, stdin=subprocess.DEVNULL, check=False)

@@ -45,6 +45,10 @@ class FrameRenderer:
         draw_markers(self._renderer.scene, markers)
         return self._renderer.render()
 
+    def draw(self, poses: np.ndarray, markers: Sequence[Sequence[Marker]]) -> tuple[np.ndarray, ...]:
+        """Frames of the poses [n, nq], each with its markers."""
+        return tuple(self.frame(pose, shown) for pose, shown in zip(poses, markers, strict=True))
+
     def close(self) -> None:
         self._renderer.close()
 
@@ -64,16 +68,25 @@ class Window:
         self._viewer: Any = viewer.launch_passive(self._model, self._data)
         self._threads = set(threading.enumerate()) - others
 
-    def show(self, qpos: np.ndarray, markers: Sequence[Marker] = ()) -> None:
-        """Show the pose qpos [nq], props and all."""
+    def draw(self, poses: np.ndarray, markers: Sequence[Sequence[Marker]]) -> None:
+        """Show the first of the poses [n, nq] with its markers."""
         with self._viewer.lock():
-            self._data.qpos[:] = qpos
+            self._data.qpos[:] = poses[0]
             mujoco.mj_forward(self._model, self._data)
             self._viewer.user_scn.ngeom = 0
-            draw_markers(self._viewer.user_scn, markers)
+            draw_markers(self._viewer.user_scn, markers[0])
         self._viewer.sync()
 
     def close(self) -> None:
         self._viewer.close()
         for thread in self._threads:  # it draws until it has seen the end; the interpreter must outlive it
             thread.join(timeout=5.0)
+
+
+def make_screen(scene: Scene, human: bool, width: int, height: int, camera: str) -> FrameRenderer | Window:
+    """A window for a human, else what draws frames of this size through this camera.
+
+    Raises:
+        SuiteError: there is no screen, no OpenGL context, or no such camera.
+    """
+    return Window(scene) if human else FrameRenderer(scene, width, height, camera)

@@ -16,9 +16,10 @@ from murmillo.envs.config import EnvConfig, check_config
 from murmillo.envs.errors import SuiteError
 from murmillo.envs.falls import FallDetector, count_every_contact
 from murmillo.envs.motion import MotionLibrary, load_clips
+from murmillo.envs.motion.demonstrations import Demonstrations
 from murmillo.envs.observations import character_state, state_dim
 from murmillo.envs.physics import State, make_physics
-from murmillo.envs.rendering import FrameRenderer, Window
+from murmillo.envs.rendering import FrameRenderer, Window, make_screen
 from murmillo.envs.residual import ResidualForces
 from murmillo.envs.scene import Scene
 from murmillo.envs.starts import FALLEN, KINDS, RECOVERY, REFERENCE, StartSampler
@@ -84,6 +85,7 @@ class HumanoidVectorEnv(VectorEnv):
         )
         self._residual = _residual_forces(self.character, config)
         self._set_spaces()
+        self.demonstrations = Demonstrations(self.library, config.window, self._action_dim)
         self._generator = torch.Generator()
         self._generator.seed()
         self._steps = torch.zeros(num_envs, dtype=torch.int64)
@@ -164,23 +166,18 @@ class HumanoidVectorEnv(VectorEnv):
         if self.render_mode is None:
             return None
         if self._screen is None:
-            config = self.config
-            human = self.render_mode == "human"
-            self._screen = (
-                Window(self.scene) if human else FrameRenderer(self.scene, config.width, config.height, config.camera)
-            )
-        state = self.state
-        poses = torch.cat((state.qpos, state.prop_qpos.flatten(1)), dim=-1)[:RENDERED_WORLDS].numpy()
-        if isinstance(self._screen, Window):
-            return self._screen.show(poses[0], self.task.markers(state, 0))
-        return tuple(self._screen.frame(pose, self.task.markers(state, i)) for i, pose in enumerate(poses))
+            config, human = self.config, self.render_mode == "human"
+            self._screen = make_screen(self.scene, human, config.width, config.height, config.camera)
+        state, worlds = self.state, range(min(self.num_envs, RENDERED_WORLDS))
+        poses = torch.cat((state.qpos, state.prop_qpos.flatten(1)), dim=-1)[: len(worlds)]
+        return self._screen.draw(poses.numpy(), [self.task.markers(state, world) for world in worlds])
 
     def close_extras(self, **kwargs: Any) -> None:
         if self._screen is not None:
             self._screen.close()
             self._screen = None
 
-    # --- skills and demonstrations -----------------------------------------------------------------------------------
+    # --- directions ---------------------------------------------------------------------------------------------------
 
     def set_skill(self, skill: str | int, env_ids: Sequence[int] | None = None) -> None:
         """Command a skill from now on, until the episode's end.
@@ -230,33 +227,6 @@ class HumanoidVectorEnv(VectorEnv):
     def observation(self) -> dict[str, np.ndarray]:
         """The current observation, which a `set_skill` since the last step has changed."""
         return self._observation()
-
-    def demonstrations(
-        self, n: int, generator: torch.Generator, skill: Tensor | None = None, frames: int | None = None
-    ) -> dict[str, Tensor]:
-        """Windows of the clips, made by the function that makes the observations.
-
-        They end at any time of a clip, and repeat its first frame where they begin before it. If their length is asked
-        for with `frames`, they lie within their clips as far as those are long enough, and end at one of their frames.
-
-        Returns:
-            window: [n, W, 120]; skill: [n] their labels; of the skills [n] asked for, or by the clips' weights. Where
-            clips were made without a sword or a shield, also mask: [n, 120] bool, true for features that are made up.
-        """
-        span = 0.0 if frames is None else (frames - 1) * self.character.control_dt
-        clip, time = self.library.sample(n, generator, skill, span, on_frames=frames is not None)
-        window = self.library.window(clip, time, frames or self.config.window)
-        drawn = {"window": window, "skill": self.library.clip_skill[clip]}
-        return drawn if self.library.mask is None else drawn | {"mask": self.library.mask[clip]}
-
-    def imitation_pairs(self, n: int, generator: torch.Generator) -> dict[str, Tensor]:
-        """`state` [n, 120] of the clips, their `skill` [n], and the `action` [n, A] that targets the next pose."""
-        clip, time = self.library.sample(n, generator)
-        qpos_next, _ = self.library.pose(clip, time + self.character.control_dt)
-        action = torch.zeros(n, self._action_dim)
-        action[:, : self.character.action_dim] = self.character.action_for(qpos_next)
-        state = self.library.window(clip, time, 1)[:, 0]
-        return {"state": state, "skill": self.library.clip_skill[clip], "action": action}
 
     # --- checkpoints -------------------------------------------------------------------------------------------------
 

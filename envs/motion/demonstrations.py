@@ -1,0 +1,42 @@
+"""What learners are shown of the clips: windows of states, and states with the action that leads to the next pose."""
+
+import torch
+from torch import Tensor
+
+from murmillo.envs.motion.library import MotionLibrary
+
+
+class Demonstrations:
+    """Draws from a library of clips, in the form in which the environment shows its own worlds."""
+
+    def __init__(self, library: MotionLibrary, window: int, action_dim: int) -> None:
+        """Windows have `window` frames unless asked otherwise; actions have `action_dim` components."""
+        self._library, self._window, self._action_dim = library, window, action_dim
+
+    def __call__(
+        self, n: int, generator: torch.Generator, skill: Tensor | None = None, frames: int | None = None
+    ) -> dict[str, Tensor]:
+        """Windows of the clips, made by the function that makes the observations.
+
+        They end at any time of a clip, and repeat its first frame where they begin before it. If their length is asked
+        for with `frames`, they lie within their clips as far as those are long enough, and end at one of their frames.
+
+        Returns:
+            window: [n, W, 120]; skill: [n] their labels; of the skills [n] asked for, or by the clips' weights. Where
+            clips were made without a sword or a shield, also mask: [n, 120] bool, true for features that are made up.
+        """
+        library = self._library
+        span = 0.0 if frames is None else (frames - 1) * library.character.control_dt
+        clip, time = library.sample(n, generator, skill, span, on_frames=frames is not None)
+        drawn = {"window": library.window(clip, time, frames or self._window), "skill": library.clip_skill[clip]}
+        return drawn if library.mask is None else drawn | {"mask": library.mask[clip]}
+
+    def imitation_pairs(self, n: int, generator: torch.Generator) -> dict[str, Tensor]:
+        """`state` [n, 120] of the clips, their `skill` [n], and the `action` [n, A] that targets the next pose."""
+        library, character = self._library, self._library.character
+        clip, time = library.sample(n, generator)
+        qpos_next, _ = library.pose(clip, time + character.control_dt)
+        action = torch.zeros(n, self._action_dim)
+        action[:, : character.action_dim] = character.action_for(qpos_next)
+        state = library.window(clip, time, 1)[:, 0]
+        return {"state": state, "skill": library.clip_skill[clip], "action": action}
