@@ -20,6 +20,8 @@ import torch
 
 from benchmarks.conftest import BARE, Figure
 from benchmarks.workload import NOISE, WARM_UP, BareSimulation, iterate, make_env, make_runner, noise
+from murmillo.envs.registration import make_task
+from murmillo.envs.tasks import TASKS
 
 WORLDS = 1024
 ROUNDS = 9
@@ -136,6 +138,29 @@ def test_training_side_by_side(benchmark: Any, record: Callable[[Figure], None])
         ratios = sorted(turn[agent] / turn["ase"] for turn in rounds[1:])
         rate = median(turn[agent] for turn in rounds[1:])
         record(Figure(f"training iteration, {agent}, smoke", rate, "samples", of_ase=_spread(ratios)))
+
+
+def test_tasks_side_by_side(benchmark: Any, record: Callable[[Figure], None]) -> None:
+    """A step of every task's environment in turn; what is said is its rate over the imitation environment's."""
+    envs = {name: make_env(WORLDS, make_task(name)) for name in TASKS}
+    counts = iter(range(WARM_UP, 10**9))
+    rounds: list[dict[str, float]] = []
+
+    def one() -> None:
+        action = noise((WORLDS, 31), next(counts))
+        rates = {}
+        for name, env in envs.items():
+            begin = time.perf_counter()
+            env.step(action)
+            rates[name] = WORLDS / (time.perf_counter() - begin)
+        rounds.append(rates)
+
+    benchmark.pedantic(one, rounds=20, iterations=1, warmup_rounds=1)
+    for name in envs:
+        ratios = sorted(turn[name] / turn["Imitation"] for turn in rounds[1:])
+        rate = median(turn[name] for turn in rounds[1:])
+        record(Figure(f"environment step, {name}", rate, f"of Imitation's: {_spread(ratios)}"))
+        envs[name].close()
 
 
 def _spread(ratios: list[float]) -> str:

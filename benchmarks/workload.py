@@ -14,6 +14,7 @@ from murmillo.cli.agents import make_agent
 from murmillo.cli.config import compose_train
 from murmillo.envs import EnvConfig, HumanoidVectorEnv
 from murmillo.envs.character import Character
+from murmillo.envs.tasks import Task
 
 NOISE = 0.2
 """Half width of the uniform actions; the character falls within a second, as an untrained policy does."""
@@ -21,9 +22,9 @@ WARM_UP = 60
 """Steps until the worlds' episodes are out of step, and as many lie on the ground as in training."""
 
 
-def make_env(num_envs: int, **kwargs: Any) -> HumanoidVectorEnv:
-    """The environment as ASE trains on it, warmed up."""
-    env = HumanoidVectorEnv(num_envs, EnvConfig(window=10, **kwargs))
+def make_env(num_envs: int, task: Task | None = None) -> HumanoidVectorEnv:
+    """The environment as ASE trains on it, or with a task, warmed up."""
+    env = HumanoidVectorEnv(num_envs, EnvConfig(window=10), task)
     env.reset(seed=0)
     for step in range(WARM_UP):
         env.step(noise((num_envs, 31), step))
