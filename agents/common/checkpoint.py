@@ -86,12 +86,19 @@ def check_compatible(meta: Mapping[str, Any], expected: Mapping[str, Any]) -> No
         AgentError: they differ; one line with every difference.
     """
     differences = [
-        f"{name} is {meta.get(name)!r} there, {value!r} here"
+        f"{name} is {_shown(meta.get(name))} there, {_shown(value)} here"
         for name, value in expected.items()
         if meta.get(name) != value
     ]
     if differences:
         raise AgentError(f"the checkpoint does not fit: {'; '.join(differences)}")
+
+
+def _shown(value: Any) -> str:
+    """The value, of a long list its length and its ends."""
+    if isinstance(value, list) and len(value) > 6:
+        return f"{len(value)} from {value[0]!r} to {value[-1]!r}"
+    return repr(value)
 
 
 def _siblings(folder: Path) -> tuple[Path, Path]:

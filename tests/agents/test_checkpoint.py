@@ -138,3 +138,9 @@ def test_what_does_not_fit_is_told_in_one_line() -> None:
 def test_keys_that_cannot_be_paths_are_refused(tmp_path: Path) -> None:
     with pytest.raises(TypeError, match="without '/'"):
         checkpoint.save(tmp_path / "c", {"a/b": math.pi})
+
+
+def test_a_long_list_that_differs_is_told_by_its_ends() -> None:
+    there, here = [f"skill{i}" for i in range(87)], ["walk", "run"]
+    with pytest.raises(AgentError, match=r"skills is 87 from 'skill0' to 'skill86' there, \['walk', 'run'\] here"):
+        checkpoint.check_compatible({"skills": there}, {"skills": here})
