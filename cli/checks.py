@@ -1,7 +1,7 @@
 """Combinations of settings that cannot be, refused before anything is made."""
 
 import dataclasses
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from operator import attrgetter
 from typing import Any
 
@@ -37,7 +37,30 @@ def check_settings(config: TrainConfig) -> None:
     Raises:
         CommandError: naming the key, what was wrong and what would be right.
     """
-    for least, names in _LEAST.items():
+    check_training(config, _LEAST)
+    if config.env.window != config.agent.window:
+        raise CommandError(
+            f"env.window={config.env.window}: the agent sees agent.window={config.agent.window} frames; "
+            "set agent.window alone"
+        )
+    if config.runner.reward_weights.get("residual") and not config.env.residual_force:
+        raise CommandError(
+            f"runner.reward_weights.residual={config.runner.reward_weights['residual']}: there are no residual forces "
+            "to be sparing with; set env.residual_force (50 N are the published code's), or drop this weight"
+        )
+
+
+def check_training(config: Any, at_least: Mapping[int, tuple[str, ...]]) -> None:
+    """Refuse of the settings of any training what cannot be.
+
+    Args:
+        config: with an agent that has a `ppo`, an environment and a runner.
+        at_least: the least that settings may be, by that; None is allowed.
+
+    Raises:
+        CommandError: naming the key, what was wrong and what would be right.
+    """
+    for least, names in at_least.items():
         for name in names:
             value = attrgetter(name)(config)
             if value is not None and not value >= least:  # so written, a NaN is refused too
@@ -56,16 +79,6 @@ def check_settings(config: TrainConfig) -> None:
         raise CommandError(
             f"agent.ppo.minibatch={config.agent.ppo.minibatch}: larger than the {batch} samples of an iteration "
             f"(num_envs {config.num_envs} x runner.horizon {config.runner.horizon}); needs at most {batch}"
-        )
-    if config.env.window != config.agent.window:
-        raise CommandError(
-            f"env.window={config.env.window}: the agent sees agent.window={config.agent.window} frames; "
-            "set agent.window alone"
-        )
-    if config.runner.reward_weights.get("residual") and not config.env.residual_force:
-        raise CommandError(
-            f"runner.reward_weights.residual={config.runner.reward_weights['residual']}: there are no residual forces "
-            "to be sparing with; set env.residual_force (50 N are the published code's), or drop this weight"
         )
     if config.env.autoreset != "same_step":
         raise CommandError(f"env.autoreset={config.env.autoreset}: training needs same_step")

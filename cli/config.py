@@ -1,10 +1,11 @@
 """The settings of `murmillo train`: hydra puts them together from `conf/`, the dataclasses of the rooms check them."""
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 from hydra import compose, initialize_config_module
 from hydra.core.config_store import ConfigStore
@@ -91,11 +92,10 @@ def compose_train(words: list[str]) -> TrainConfig:
     Raises:
         CommandError: a word that cannot be, in one line with what would be right.
     """
-    _check_words(words)
-    resumed = [word.split("=", 1)[1] for word in words if word.startswith("run.resume=")]
-    if resumed and resumed[-1] not in ("null", ""):
-        return _compose_resumed(resumed[-1], words)
-    composed, choices = _compose(words)
+    check_words(words)
+    if (resumed := resumed_run(words)) is not None:
+        return resume(resumed, words, load, RESUMABLE)
+    composed, choices = compose_words(words)
     return typed(composed, choices)
 
 
@@ -110,7 +110,7 @@ def typed(composed: DictConfig, choices: Mapping[str, Any]) -> TrainConfig:
     return build(TrainConfig, {**values, "choices": chosen})
 
 
-def save(config: TrainConfig, folder: Path) -> None:
+def save(config: Any, folder: Path) -> None:
     """Write `config.yaml`: every setting, resolved."""
     runs.write_text(folder / runs.CONFIG, OmegaConf.to_yaml(OmegaConf.create(dataclasses.asdict(config))))
 
@@ -121,18 +121,30 @@ def load(folder: Path, words: list[str] | None = None) -> TrainConfig:
     Raises:
         CommandError: the file is no configuration of this version.
     """
-    try:
-        saved = OmegaConf.load(folder / runs.CONFIG)
-        choices = saved.pop("choices") if isinstance(saved, DictConfig) and "choices" in saved else None
-        if not isinstance(choices, DictConfig) or choices.get("agent") not in AGENTS:
+    with reading(folder) as (saved, choices):
+        if choices.get("agent") not in AGENTS:
             raise CommandError(f"choices.agent: is none of {', '.join(AGENTS)}; copy the file of the run anew")
-        composed, _ = _compose([f"agent={choices.agent}"])
-        return typed(_merge(composed, saved, words or []), choices)
+        composed, _ = compose_words([f"agent={choices['agent']}"])
+        return typed(merge(composed, saved, words or []), choices)
+
+
+@contextmanager
+def reading(folder: Path) -> Iterator[tuple[DictConfig, Mapping[str, Any]]]:
+    """The settings that a run kept and the choices they come from; what is wrong with them names the file.
+
+    Raises:
+        CommandError: there is no configuration in the file, or what is made of it inside fails.
+    """
+    path = folder / runs.CONFIG
+    try:
+        saved = OmegaConf.load(path)
+        choices = saved.pop("choices") if isinstance(saved, DictConfig) and "choices" in saved else None
+        yield cast(DictConfig, saved), choices if isinstance(choices, DictConfig) else {}
     except CommandError as error:
-        raise CommandError(f"{folder / runs.CONFIG}: {error}") from None
+        raise CommandError(f"{path}: {error}") from None
     except (OSError, ValueError, YAMLError) as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise CommandError(f"{folder / runs.CONFIG}: no configuration that can be read ({reason})") from None
+        raise CommandError(f"{path}: no configuration that can be read ({reason})") from None
 
 
 def parse(cls: type[T], words: list[str]) -> T:
@@ -149,7 +161,7 @@ def parse(cls: type[T], words: list[str]) -> T:
             raise CommandError(f"{word}: settings are written name=value, with the names {', '.join(names)}")
         if name not in names:
             raise wrong_name(name, names)
-    values = _merge(known, OmegaConf.create(), words)
+    values = merge(known, OmegaConf.create(), words)
     try:
         missing = sorted(OmegaConf.missing_keys(values))
         plain: Any = OmegaConf.to_container(values, resolve=True, enum_to_str=True)
@@ -160,10 +172,10 @@ def parse(cls: type[T], words: list[str]) -> T:
     return build(cls, plain)
 
 
-def _compose(words: list[str]) -> tuple[DictConfig, Mapping[str, Any]]:
-    """Hydra's configuration of these words, and its choices by group."""
+def compose_words(words: list[str], files: str = "murmillo.conf") -> tuple[DictConfig, Mapping[str, Any]]:
+    """Hydra's configuration of these words over the `files` of a package, and its choices by group."""
     register()
-    with initialize_config_module("murmillo.conf", version_base="1.3"):
+    with initialize_config_module(files, version_base="1.3"):
         try:
             composed = compose("config", words, return_hydra_config=True)
         except (HydraException, OmegaConfBaseException, ValueError) as error:
@@ -174,20 +186,37 @@ def _compose(words: list[str]) -> tuple[DictConfig, Mapping[str, Any]]:
     return composed, choices
 
 
-def _compose_resumed(path: str, words: list[str]) -> TrainConfig:
+def resumed_run(words: list[str]) -> str | None:
+    """The run that is to be taken up again, if any."""
+    resumed = [word.split("=", 1)[1] for word in words if word.startswith("run.resume=")]
+    return resumed[-1] if resumed and resumed[-1] not in ("null", "") else None
+
+
+def resume(path: str, words: list[str], load: Callable[[Path, list[str]], T], settable: tuple[str, ...]) -> T:
+    """The settings of the run at `path`, as `load` reads them, with those of `words` that may be set anew.
+
+    Raises:
+        CommandError: there is no such run, or a word sets what is the run's own.
+    """
     folder = runs.existing(path, "run.resume")
     for word in words:
-        if not word.startswith(RESUMABLE):
+        if not word.startswith(settable):
+            names = ", ".join(f"{name}*" if name.endswith(".") else name.rstrip("=") for name in settable)
             raise CommandError(
-                f"{word}: a run is taken up again with its own settings, but for runner.*, run.* and threads; "
+                f"{word}: a run is taken up again with its own settings, but for {names}; "
                 "drop this one, or start a new run"
             )
-    config = load(folder, words)
+    config: Any = load(folder, words)
     config.run.root, config.run.name = str(folder.parent), folder.name
     return config
 
 
-def _merge(known: DictConfig, saved: Any, words: list[str]) -> DictConfig:
+def merge(known: DictConfig, saved: Any, words: list[str]) -> DictConfig:
+    """What is `known` and set by default, with what was `saved` and then the `words` name=value laid over it.
+
+    Raises:
+        CommandError: a name or a value that `known` does not allow.
+    """
     OmegaConf.set_struct(known, None)  # hydra locks dicts too, where new names are fine
     try:
         merged = OmegaConf.merge(known, saved, _dotlist(words))
@@ -206,7 +235,7 @@ def _dotlist(words: list[str]) -> DictConfig:
     return OmegaConf.from_dotlist(words)
 
 
-def _check_words(words: list[str]) -> None:
+def check_words(words: list[str]) -> None:
     """Refuse what hydra would misread, and its `~name`, which takes a setting away."""
     for word in words:
         plain = word.lstrip("+")

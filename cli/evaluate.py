@@ -20,6 +20,11 @@ murmillo evaluate: measure a trained agent as the papers do
   worlds         64               episodes that the policy is measured in before and after training, 0 for none
   motions        the run's own    a folder or file, where the clips have moved; other clips are not comparable
 
+Of a run that learned a task (murmillo train task=…): its normalised return beside that of the untrained policy and of
+random latents, in worlds=256 episodes, as a table and in report.md; it takes seed, motions and
+
+  low            the run's own    folder of the low-level run, where it has moved
+
 Writes evaluation.md, evaluation.html and evaluation/ into the run's folder. What is recorded stays there: the same
 command goes on where it was stopped. docs/metrics.md says how each metric is measured.
 """
@@ -47,7 +52,12 @@ def run(words: list[str]) -> int:
     from murmillo.cli import runs
     from murmillo.cli.evaluation.evaluating import Request, evaluate
     from murmillo.cli.seeds import check_seed
+    from murmillo.cli.tasks.words import is_task_run, value_of
 
+    if is_task_run(value_of(words, "run")):
+        from murmillo.cli.tasks.evaluate import run as evaluate_task
+
+        return evaluate_task(words)
     settings = configuration.parse(EvaluateConfig, [_listed(word) for word in words])
     trajectories = settings.trajectories
     if trajectories is None:

@@ -9,7 +9,7 @@ from rich.live import Live
 from rich.progress_bar import ProgressBar
 from rich.table import Table
 
-from murmillo.cli.metrics import TRAINING
+from murmillo.cli.metrics import TRAINING, Metric
 
 PLAIN_INTERVAL_S = 10.0
 
@@ -30,10 +30,12 @@ class Progress(Protocol):
     def __exit__(self, *error: object) -> None: ...
 
 
-def make_progress(samples: int, begun_at: int, max_minutes: float | None) -> Progress:
+def make_progress(
+    samples: int, begun_at: int, max_minutes: float | None, metrics: tuple[Metric, ...] = TRAINING
+) -> Progress:
     """The display for this standard output. `begun_at` are the samples that a resumed run already has."""
     schedule = Schedule(samples, begun_at, max_minutes)
-    return LivePanel(schedule) if sys.stdout.isatty() else PlainLines(schedule)
+    return LivePanel(schedule, metrics) if sys.stdout.isatty() else PlainLines(schedule, metrics)
 
 
 class Schedule:
@@ -58,8 +60,8 @@ class Schedule:
 class PlainLines:
     """One line every ten seconds, for files and pipes."""
 
-    def __init__(self, schedule: Schedule) -> None:
-        self._schedule = schedule
+    def __init__(self, schedule: Schedule, metrics: tuple[Metric, ...] = TRAINING) -> None:
+        self._schedule, self._metrics = schedule, metrics
         self._shown_at = -PLAIN_INTERVAL_S
 
     def __enter__(self) -> "PlainLines":
@@ -79,7 +81,7 @@ class PlainLines:
             f"{samples:,} samples",
             f"{self._schedule.rate(samples, seconds):,.0f}/s",
             f"{clock(self._schedule.seconds_left(samples, seconds))} left",
-            *(f"{m.title.lower()} {m.show(scalars[m.scalar])}" for m in TRAINING if m.scalar in scalars),
+            *(f"{m.title.lower()} {m.show(scalars[m.scalar])}" for m in self._metrics if m.scalar in scalars),
         ]
         print(", ".join(parts), flush=True)
 
@@ -87,8 +89,10 @@ class PlainLines:
 class LivePanel:
     """A panel that is drawn over itself."""
 
-    def __init__(self, schedule: Schedule, console: Console | None = None) -> None:
-        self._schedule = schedule
+    def __init__(
+        self, schedule: Schedule, metrics: tuple[Metric, ...] = TRAINING, console: Console | None = None
+    ) -> None:
+        self._schedule, self._metrics = schedule, metrics
         self._live = Live(console=console or Console(), refresh_per_second=4, transient=False)
         self._first: dict[str, float] = {}
 
@@ -113,7 +117,7 @@ class LivePanel:
         panel.add_row(
             "Samples", f"{samples:,} of {schedule.samples:,}, {schedule.rate(samples, seconds):,.0f} a second"
         )
-        for metric in TRAINING:
+        for metric in self._metrics:
             if metric.scalar in scalars:
                 first = self._first.setdefault(metric.scalar, scalars[metric.scalar])
                 now = metric.show(scalars[metric.scalar])

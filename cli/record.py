@@ -24,7 +24,9 @@ murmillo record: film a trained agent
   out       video.mp4        file, in the run's folder unless it is a path
   seed      1                of the start
   motions   the run's own    a folder or file, where the clips have moved
+  low       the run's own    of a run that learned a task: folder of the low-level run, where it has moved
 
+A run that learned a task is shown with its goals; it follows no clips.
 Works without a screen, through EGL or OSMesa; `murmillo doctor` says whether this machine has one of them.
 """
 
@@ -52,11 +54,14 @@ def run(words: list[str]) -> int:
     from murmillo.cli import config as configuration
     from murmillo.cli import runs
     from murmillo.cli.seeds import check_seed
+    from murmillo.cli.tasks import record as tasks
+    from murmillo.cli.tasks.words import is_task_run, value_of
 
-    settings = configuration.parse(RecordConfig, words)
+    of_task = is_task_run(value_of(words, "run"))
+    settings = configuration.parse(tasks.TaskRecordConfig if of_task else RecordConfig, words)
     if not 0.0 < settings.seconds < math.inf:  # so written, a NaN is refused too
         raise CommandError(f"seconds={settings.seconds:g}: needs a number above 0")
-    if settings.blend and len(settings.clips) < 2:
+    if isinstance(settings, RecordConfig) and settings.blend and len(settings.clips) < 2:
         raise CommandError("blend=true: goes from one clip to the next; name two or more, clips=[walk_forward,kick]")
     check_seed("seed", settings.seed)
     folder = runs.existing(settings.run, "run")
@@ -65,7 +70,11 @@ def run(words: list[str]) -> int:
         raise CommandError(f"out={settings.out}: needs a file name that ends in .mp4, in a folder that exists")
     if backend is None:
         raise CommandError(gl.no_gl_message(tried))
-    print(f"filmed {settings.seconds:g} s: {film(configuration.load(folder), folder, settings, out)}")
+    if isinstance(settings, RecordConfig):
+        film(configuration.load(folder), folder, settings, out)
+    else:
+        tasks.film(folder, settings, out)
+    print(f"filmed {settings.seconds:g} s: {out}")
     return 0
 
 

@@ -26,9 +26,9 @@ def write(folder: Path) -> Path:
     sections = [
         f"# {folder.name}",
         _what(config, runs.read_json(folder / runs.VERSIONS, {}), scalars),
-        _terms(runs.read_json(folder / runs.TERMS)),
-        _film(folder),
-        _notices(runs.read_json(folder / runs.NOTICES, [])),
+        terms(runs.read_json(folder / runs.TERMS)),
+        film(folder),
+        notices(runs.read_json(folder / runs.NOTICES, [])),
         _ages(measures),
         obedience.section(measures, runs.read_json(folder / runs.SKILLS, {})),
         encodings.section(measures),
@@ -36,8 +36,8 @@ def write(folder: Path) -> Path:
     ]
     if len(scalars["samples"]):
         plots = plot_all(scalars, folder / runs.PLOTS)
-        sections += [_first_and_last(scalars), _minutes(scalars), _pictures(plots, folder)]
-    sections += [_meanings(scalars), _going_on(folder, config, scalars)]
+        sections += [first_and_last(scalars), minutes(scalars), pictures(plots, folder)]
+    sections += [meanings(scalars), _going_on(folder, config, scalars)]
     path = folder / runs.REPORT
     runs.write_text(path, "\n\n".join(section for section in sections if section) + "\n")
     return path
@@ -57,17 +57,24 @@ def read_scalars(path: Path) -> Scalars:
 
 
 def _what(config: Any, versions: dict[str, Any], scalars: Scalars) -> str:
-    choices, machine, packages = config.choices, versions.get("machine", {}), versions.get("packages", {})
+    choices = config.choices
     samples = int(scalars["samples"][-1]) if len(scalars["samples"]) else 0
     minutes = scalars["seconds"][-1] / 60.0 if samples else 0.0
     rate = samples / (60.0 * minutes) if minutes else 0.0
     changed = "" if choices.ablation == "none" else f" with the ablation `{choices.ablation}`"
-    git = versions.get("git", {})
-    commit = f"{git['commit'][:12]}{', changed' if git['dirty'] else ''}" if git.get("commit") else "no checkout"
     return (
         f"`{choices.agent}`{changed} learned from the clips `{config.motions}` with the budget `{choices.budget}`, "
         f"seed {config.seed}: {samples:,} samples (control steps of 1/30 s, {samples / 30 / 3600:.1f} simulated "
         f"hours) in {minutes:.1f} minutes, {rate:,.0f} samples/s, in {config.num_envs} worlds.\n\n"
+        f"{made_on(versions)}"
+    )
+
+
+def made_on(versions: dict[str, Any]) -> str:
+    """The machine, the software and where all settings are."""
+    machine, packages, git = (versions.get(name, {}) for name in ("machine", "packages", "git"))
+    commit = f"{git['commit'][:12]}{', changed' if git['dirty'] else ''}" if git.get("commit") else "no checkout"
+    return (
         f"Made on {machine.get('processor', 'an unknown processor')}, {machine.get('cores', '?')} cores, "
         f"{versions.get('threads', '?')} threads; Python {machine.get('python', '?')}, "
         f"torch {packages.get('torch', '?')}, mujoco {packages.get('mujoco', '?')}, sources {commit}. "
@@ -75,24 +82,24 @@ def _what(config: Any, versions: dict[str, Any], scalars: Scalars) -> str:
     )
 
 
-def _terms(terms: dict[str, Any] | None) -> str:
+def terms(found: dict[str, Any] | None) -> str:
     """What the licences of the clips come to for the weights; of runs that have kept them."""
-    return f"Learned from clips under these {Terms(**terms)}" if terms else ""
+    return f"Learned from clips under these {Terms(**found)}" if found else ""
 
 
-def _film(folder: Path) -> str:
+def film(folder: Path) -> str:
     if (folder / runs.VIDEO).is_file():
         return f"The trained character: [`{runs.VIDEO}`]({runs.VIDEO})"
     reason = runs.read_json(folder / runs.FILMING, {}).get("reason")
     return f"No video: {reason}" if reason else ""
 
 
-def _notices(notices: list[dict[str, Any]]) -> str:
+def notices(found: list[dict[str, Any]]) -> str:
     """The failures that the runner saw, and whether they are over."""
-    if not notices:
+    if not found:
         return ""
     lines = []
-    for notice in notices:
+    for notice in found:
         over = "" if notice["over"] is None else f" (Over at {notice['over']:,}.)"
         lines.append(f"- At {notice['samples']:,} samples: {notice['text']}.{over}")
     hint = "`runner.*` can be set when this run is taken up again; all else needs a new run."
@@ -144,14 +151,14 @@ def _present(scalars: Scalars, metrics: tuple[Metric, ...] = TRAINING) -> list[M
     return [metric for metric in metrics if metric.scalar in scalars]
 
 
-def _first_and_last(scalars: Scalars) -> str:
+def first_and_last(scalars: Scalars, metrics: tuple[Metric, ...] = TRAINING + LABELS) -> str:
     """The first minute against the last one while training; in a short run, its first quarter against its last."""
     seconds = scalars["seconds"]
     span = min(60.0, seconds[-1] / 4.0)
     first, last = seconds <= max(span, seconds[0]), seconds > seconds[-1] - span
     rows = [
         f"| {m.title} | {m.show(_mean(scalars[m.scalar][first]))} | {m.show(_mean(scalars[m.scalar][last]))} |"
-        for m in _present(scalars, TRAINING + LABELS)
+        for m in _present(scalars, metrics)
     ]
     return "\n".join(
         [
@@ -167,29 +174,29 @@ def _first_and_last(scalars: Scalars) -> str:
     )
 
 
-def _minutes(scalars: Scalars) -> str:
+def minutes(scalars: Scalars, metrics: tuple[Metric, ...] = TRAINING) -> str:
     """At most twelve rows of equal time."""
-    metrics, seconds = _present(scalars), scalars["seconds"]
+    shown, seconds = _present(scalars, metrics), scalars["seconds"]
     width = 60.0 * max(1.0, np.ceil(seconds[-1] / 60.0 / _MAX_ROWS))
     rows = []
     for begin in np.arange(0.0, seconds[-1], width):
         inside = (seconds > begin) & (seconds <= begin + width)
         if inside.any():
-            figures = " | ".join(m.show(_mean(scalars[m.scalar][inside])) for m in metrics)
+            figures = " | ".join(m.show(_mean(scalars[m.scalar][inside])) for m in shown)
             minute, samples = min(begin + width, seconds[-1]) / 60.0, int(scalars["samples"][inside][-1])
             rows.append(f"| {minute:.1f} | {samples:,} | {figures} |")
-    titles = " | ".join(m.title for m in metrics)
-    return "\n".join([f"| minute | samples | {titles} |", f"|---:|---:|{'---:|' * len(metrics)}", *rows])
+    titles = " | ".join(m.title for m in shown)
+    return "\n".join([f"| minute | samples | {titles} |", f"|---:|---:|{'---:|' * len(shown)}", *rows])
 
 
-def _pictures(plots: list[Path], folder: Path) -> str:
+def pictures(plots: list[Path], folder: Path) -> str:
     names = [plot.relative_to(folder).as_posix() for plot in plots]
     return "\n\n".join(f"![{Path(name).stem.replace('_', ' ')}]({name})" for name in names)
 
 
-def _meanings(scalars: Scalars) -> str:
-    meanings = (f"- **{m.title}**: {m.meaning}" for m in _present(scalars, TRAINING + LABELS) or TRAINING)
-    return "\n".join(["## What the figures mean", "", *meanings])
+def meanings(scalars: Scalars, metrics: tuple[Metric, ...] = TRAINING + LABELS) -> str:
+    lines = (f"- **{m.title}**: {m.meaning}" for m in _present(scalars, metrics) or TRAINING)
+    return "\n".join(["## What the figures mean", "", *lines])
 
 
 def _going_on(folder: Path, config: Any, scalars: Scalars) -> str:

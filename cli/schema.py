@@ -6,6 +6,7 @@ and `build` makes the true dataclass of a checked configuration.
 
 import dataclasses
 import types
+from collections.abc import Sequence
 from enum import Enum
 from functools import cache
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
@@ -26,6 +27,11 @@ def schema_of(cls: type) -> type:
         hint = _schema_type(hints[field.name])
         fields.append((field.name, hint, dataclasses.field(default_factory=_Default(field, hint))))
     return dataclasses.make_dataclass(cls.__name__, fields)
+
+
+def twin_of(value: Any) -> Any:
+    """The dataclass `value` as an instance of its twin."""
+    return _schema_value(value, schema_of(type(value)))
 
 
 class _Default:
@@ -50,6 +56,8 @@ def _schema_type(hint: Any) -> Any:
         return schema_of(hint)  # type: ignore[arg-type]
     if get_origin(hint) is Literal:
         return _enumeration(get_args(hint))
+    if get_origin(hint) is Sequence:  # its items are checked by what they are for
+        return list[Any]
     inner = _optional(hint)
     return hint if inner is None else _schema_type(inner) | None
 

@@ -1,6 +1,7 @@
 """`murmillo train`: one run, or with --multirun one for each combination of settings."""
 
 from murmillo.cli.errors import CommandError
+from murmillo.cli.tasks.words import are_about_a_task
 
 HELP = """\
 murmillo train: train an agent on motion clips
@@ -11,6 +12,8 @@ murmillo train: train an agent on motion clips
   murmillo train ablation=no_diversity               without a part of the method
   murmillo train run.resume=runs/<name>              take a stopped run up again
   murmillo train --multirun seed=1,2,3               one run for each value
+  murmillo train task=location low=runs/<name>       a task, by the skills of a trained agent
+  murmillo train task=location low=none              the same task without an agent below
 
 Settings are written name=value. The first ones:
 
@@ -25,6 +28,14 @@ Settings are written name=value. The first ones:
   run.evaluate  true                                 measure the quick metrics of `murmillo evaluate` at the end
   run.video  true                                    film the trained character at the end
 
+With task=… a high-level policy learns to choose what the agent of another run does; its first settings:
+
+  task       reach, speed, steering, location, direction, relocation, path_follow, strike, block or recovery;
+             its arguments are task.radius=5 and the like (docs/tasks.md)
+  low        folder of a run of ase, case or calm, whose clips and character it takes over; or none
+  budget     smoke (10 minutes), laptop (2 hours), paper
+  run.video, run.name, run.root, run.resume, seed, num_envs, threads: as above
+
 `config.yaml` in the folder of a run shows every setting; each can be given here by its dotted name, such as
 agent.ppo.std=0.05 or runner.max_minutes=30. Ctrl-C ends a run after the iteration under way, with a checkpoint.
 """
@@ -37,6 +48,9 @@ def run(words: list[str]) -> int:
     for flag in flags:
         if flag not in ("--multirun", "-m"):
             raise CommandError(f"{flag}: there is no such option; known are --multirun and --help")
+    if are_about_a_task(settings):
+        return _train_task(settings, multirun=bool(flags))
+    settings = [word for word in settings if not word.startswith("task=")]
     if flags:
         from murmillo.cli.sweep import sweep
 
@@ -45,3 +59,18 @@ def run(words: list[str]) -> int:
     from murmillo.cli.training import train
 
     return train(compose_train(settings))
+
+
+def _train_task(words: list[str], multirun: bool) -> int:
+    """One run of a task, or one after the other for each combination of values."""
+    from murmillo.cli.tasks.config import compose_task
+    from murmillo.cli.tasks.training import train
+
+    if not multirun:
+        return train(compose_task(words))
+    from murmillo.cli.sweep import combinations
+
+    configs = [compose_task(list(combination)) for combination in combinations(words)]  # a mistake shows before any run
+    for number, config in enumerate(configs):
+        train(config, suffix=f"-{number}")
+    return 0

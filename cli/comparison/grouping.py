@@ -22,12 +22,14 @@ _IDLE = (
 """Settings that change nothing in what is learned from how much."""
 _REPEATED = ("env.motions", "env.window")
 """Settings that follow from others."""
-_FOREMOST = ("choices.agent", "choices.ablation", "motions", "choices.budget")
+_FOREMOST = ("choices.task", "choices.agent", "choices.ablation", "motions", "choices.budget")
 """Settings that a label takes before all others."""
 _SHARED_NETWORKS = ("agent.ppo.hidden", "agent.discriminator.hidden")
 """Networks that every method has; its further ones belong to the method."""
 _ENDINGS = ("env.episode_steps", "env.fall.")
 """Settings that decide how long an episode can be."""
+_TASK = ("choices.task", "task.")
+"""Settings that decide what is rewarded."""
 _SOURCES, _CLIPS = "sources", "clips"
 """What is not among the settings and yet decides: the commit of the code, and what the clips were."""
 _ABSENT = "absent"
@@ -143,6 +145,9 @@ def _conditions(one: Group, first: Group) -> Iterator[str]:
     (clips, digest), (known, its) = ((shown(some, "motions"), shown(some, _CLIPS)) for some in (one, first))
     if (digest != its) if _ABSENT not in (digest, its) else (clips != known):
         yield "other clips: " + (f"{clips} against {known}" if clips != known else f"{clips} were changed in between")
+    for name in sorted({name for name in (*one.settings, *first.settings) if name.startswith(_TASK)}):
+        if (value := shown(one, name)) != (known := shown(first, name)):
+            yield f"another task: {name.removeprefix('choices.')} {value} against {known}"
     if (character := shown(one, "env.character")) != (known := shown(first, "env.character")):
         yield f"another character: {character} against {known}"
     for name in _networks(one, first):

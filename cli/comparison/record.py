@@ -46,6 +46,7 @@ class Quantity(NamedTuple):
 
 
 STYLE_SCORE = Quantity(TRAINED, "score", "Style score", "", "up")
+NORMALISED_RETURN = Quantity(TRAINED, "normalised_return", "Normalised return", "", "up")
 LENGTH = Quantity(TRAINED, "length", "Episode length", "steps", "up")
 FALLS = Quantity(TRAINED, "fall_rate", "Fall rate", "", "down")
 SAMPLES = Quantity(LOG, "samples", "Samples")
@@ -64,6 +65,10 @@ _MEASURES = {
         Quantity(TRAINED, "heads.other", "Other heads"),
         Quantity(TRAINED, "residual_share", "Residual share", "", "down"),
         Quantity(TRAINED, "concentration", "Fisher concentration", "", "down"),
+        NORMALISED_RETURN,
+        Quantity(TRAINED, "reach_error", "Distance of the sword's tip from the target", "m", "down"),
+        Quantity(TRAINED, "heading_cosine", "Cosine of movement and its direction", "", "up"),
+        Quantity(TRAINED, "early_rate", "Share of episodes that ended early", "", "down"),
     )
 }
 _COUNTS = ("episodes", "steps")
@@ -77,7 +82,7 @@ class Run:
     Attributes:
         folder: where it lies.
         settings: its configuration by dotted name.
-        scalars: its log, with at least one iteration.
+        scalars: its log, with at least one iteration; `samples` are control steps.
         history: coverage of the checkpoints that were evaluated, by name; empty where none was.
         figures: what was measured.
         clips: digests of its clips by name, where the run kept them.
@@ -135,6 +140,8 @@ def read(folder: Path) -> Run | None:
         clips = dict(runs.read_json(path, {}))
     with _reading(folder / runs.VERSIONS) as path:
         versions = dict(runs.read_json(path, {}))
+    # a decision of a high-level policy counts as the control steps that it takes, which all runs have in common
+    scalars["samples"] = settings.get("latent_env.steps", 1) * scalars["samples"]
     run = Run(folder, settings, scalars, coverages, figures, clips, versions)
     figures |= _logged(run)
     return run

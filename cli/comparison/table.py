@@ -11,6 +11,7 @@ from murmillo.cli.comparison.record import (
     HOURS,
     LENGTH,
     LOG,
+    NORMALISED_RETURN,
     SAMPLES,
     STYLE_SCORE,
     THROUGHPUT,
@@ -23,7 +24,7 @@ Table = dict[Quantity, dict[str, Summary]]
 """The summary of a quantity by label of the group; groups that have not measured it are missing."""
 
 _ARROWS = {"up": " ↑", "down": " ↓"}
-_ORDER = (STYLE_SCORE, LENGTH, FALLS)
+_ORDER = (NORMALISED_RETURN, STYLE_SCORE, LENGTH, FALLS)
 
 
 def tabulate(groups: list[Group]) -> Table:
@@ -42,7 +43,7 @@ def tabulate(groups: list[Group]) -> Table:
 
 
 def headlines(table: Table) -> list[Quantity]:
-    """What a reader looks for first: style score, episode length, coverage, samples and speed."""
+    """What a reader looks for first: return, style score, episode length, coverage, samples and speed."""
     return [
         quantity
         for quantity in table

@@ -58,7 +58,7 @@ TINY = (
 )
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def tiny() -> tuple[str, ...]:
     """Settings of a run of two iterations that takes a second."""
     return TINY

@@ -1,0 +1,52 @@
+"""The figures of a run that learned a task, in `evaluation/metrics.json`, where `murmillo compare` reads them."""
+
+from pathlib import Path
+from typing import Any
+
+from murmillo.agents.common import checkpoint
+from murmillo.cli import runs
+from murmillo.cli.evaluation.identity import checkpoint_digest
+from murmillo.cli.tasks import low, table
+from murmillo.cli.tasks.config import TaskTrainConfig
+from murmillo.cli.tasks.low import LowRun
+from murmillo.cli.tasks.measuring import measure
+
+SEED = 12345
+
+
+def evaluate(
+    config: TaskTrainConfig, below: LowRun | None, folder: Path, worlds: int, seed: int = SEED
+) -> dict[str, Any]:
+    """Measure the run in `folder` in so many episodes and keep what was found.
+
+    Returns:
+        What `evaluation/metrics.json` has.
+
+    Raises:
+        AgentError: there is no checkpoint, or it does not fit.
+        CommandError, SuiteError: the low-level run has changed, or the environment cannot be made.
+    """
+    saved = checkpoint.load(folder / runs.LAST)
+    low.check_unchanged(below, saved)
+    measured = measure(config, below, folder / runs.LAST, worlds, seed)
+    results = {
+        "run": folder.name,
+        "task": config.choices["task"],
+        "agent": config.choices["agent"],
+        "samples": int(saved.get("samples", 0)),
+        "checkpoint": checkpoint_digest(folder / runs.LAST),
+        "trajectories": worlds,
+        "seed": seed,
+        "start": "as in training",
+        "not_comparable": None,
+        "metrics": {
+            "task": {
+                "title": "The task",
+                "protocols": ["one episode a world, mean actions"],
+                "figures": table.entries(measured),
+            }
+        },
+    }
+    (folder / runs.EVALUATION).mkdir(exist_ok=True)
+    runs.write_json(folder / runs.METRICS, results)
+    return results

@@ -1,0 +1,118 @@
+"""The low-level run beneath a high-level policy: found, checked, and known again by its checkpoint."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from murmillo.agents.common.checkpoint import META, TENSORS
+from murmillo.agents.common.errors import AgentError
+from murmillo.cli import config as configuration
+from murmillo.cli import runs
+from murmillo.cli.agents import load_player
+from murmillo.cli.config import TrainConfig
+from murmillo.cli.errors import CommandError
+from murmillo.cli.evaluation.identity import checkpoint_digest
+from murmillo.cli.tasks.words import is_task_run
+from murmillo.envs import EnvConfig, HumanoidVectorEnv
+
+NONE = "none"
+"""`low=none`: the policy acts itself, on the character's own action."""
+SCRATCH = "scratch"
+"""What ASE calls such a policy, and its name among the agents."""
+
+_PATH, _DIGEST = "low", "low_digest"
+"""Where a checkpoint keeps which policy it was trained over."""
+_ITS_OWN = ("character", "window", "residual_force", "residual_reward")
+"""Settings of the environment that its policy and its discriminator were made for."""
+
+
+@dataclass(frozen=True)
+class LowRun:
+    """A run whose policy is followed.
+
+    Attributes:
+        word: as the user named it.
+        folder: of the run.
+        config: its settings.
+    """
+
+    word: str
+    folder: Path
+    config: TrainConfig
+
+    @property
+    def kind(self) -> str:
+        """Its agent's name."""
+        return self.config.choices["agent"]
+
+    def digest(self) -> str:
+        """SHA-256 of its checkpoint's tensors."""
+        return checkpoint_digest(self.folder / runs.LAST)
+
+    def check_env(self, env: EnvConfig) -> None:
+        """Refuse an environment that its policy cannot act in.
+
+        Raises:
+            CommandError: naming the setting.
+        """
+        for name in _ITS_OWN:
+            if (value := getattr(env, name)) != (own := getattr(self.config.env, name)):
+                raise CommandError(
+                    f"env.{name}={value}: the policy of low={self.word} was trained with {own}; "
+                    f"drop env.{name}, or name another run"
+                )
+
+    def load(self, env: HumanoidVectorEnv) -> Any:
+        """Its agent, to be followed in `env`.
+
+        Raises:
+            CommandError: its checkpoint is damaged, or another character's.
+        """
+        try:
+            return load_player(self.kind, self.config.agent, env, self.config.seed, self.folder / runs.LAST)
+        except AgentError as error:
+            raise CommandError(f"low={self.word}: {error}") from None
+
+
+def find(word: str) -> LowRun | None:
+    """The run that `low=word` names; None for `none`.
+
+    Raises:
+        CommandError: there is no such run, it has no checkpoint, or it has learned a task itself.
+    """
+    if word == NONE:
+        return None
+    folder = runs.existing(word, "low")
+    if is_task_run(word):
+        raise CommandError(f"low={word}: this run has learned a task itself; name a run of ase, calm or case")
+    if not all((folder / runs.LAST / name).is_file() for name in (META, TENSORS)):
+        raise CommandError(f"low={word}: this run has no checkpoint; train it first: murmillo train run.resume={word}")
+    return LowRun(word, folder, configuration.load(folder))
+
+
+def identity(below: LowRun | None) -> dict[str, str]:
+    """What a checkpoint keeps of the policy that it was trained over: where it was, and its digest."""
+    return {} if below is None else {_PATH: str(below.folder), _DIGEST: below.digest()}
+
+
+def check_unchanged(below: LowRun | None, saved: dict[str, Any]) -> None:
+    """Refuse another policy below than the one that a checkpoint was trained over.
+
+    Args:
+        below: what is there now.
+        saved: content of the checkpoint.
+
+    Raises:
+        CommandError: their digests differ.
+    """
+    digest, here = (known.get(_DIGEST) for known in (saved.get("meta", {}), identity(below)))
+    if here != digest:
+        word = NONE if below is None else below.word
+        raise CommandError(
+            f"low={word}: its checkpoint is not the one that this policy was trained over (SHA-256 {_short(digest)} "
+            f"then, {_short(here)} now); name a copy of that one with low=…, or train a new policy"
+        )
+
+
+def _short(digest: str | None) -> str:
+    return NONE if digest is None else digest[:12]

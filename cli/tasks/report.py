@@ -1,0 +1,99 @@
+"""`report.md` of a run that learned a task: what was trained, how well it is done, what that means, how to go on."""
+
+import shlex
+from pathlib import Path
+from typing import Any
+
+from omegaconf import OmegaConf
+
+from murmillo.cli import report as common
+from murmillo.cli import runs
+from murmillo.cli.plots import Scalars
+from murmillo.cli.tasks import plots, table
+from murmillo.cli.tasks.low import NONE
+from murmillo.cli.tasks.metrics import training_metrics
+
+
+def write(folder: Path) -> Path:
+    """Write the report and its plots from what lies in the run's folder; the report's path."""
+    scalars = common.read_scalars(folder / runs.SCALARS)
+    config = OmegaConf.load(folder / runs.CONFIG)
+    metrics = training_metrics(config.latent_env.steps)
+    sections = [
+        f"# {folder.name}",
+        _what(config, runs.read_json(folder / runs.VERSIONS, {}), scalars),
+        common.terms(runs.read_json(folder / runs.TERMS)),
+        common.film(folder),
+        common.notices(runs.read_json(folder / runs.NOTICES, [])),
+        _figures(config, runs.read_json(folder / runs.METRICS)),
+    ]
+    if len(scalars["samples"]):
+        curve = plots.plot_learning(scalars, config.latent_env.steps, folder / runs.PLOTS)
+        sections += [
+            common.first_and_last(scalars, metrics),
+            common.minutes(scalars, metrics),
+            common.pictures([curve], folder),
+        ]
+    sections += [common.meanings(scalars, metrics), _going_on(folder, config, scalars)]
+    path = folder / runs.REPORT
+    runs.write_text(path, "\n\n".join(section for section in sections if section) + "\n")
+    return path
+
+
+def _what(config: Any, versions: dict[str, Any], scalars: Scalars) -> str:
+    choices, steps = config.choices, config.latent_env.steps
+    samples = int(scalars["samples"][-1]) if len(scalars["samples"]) else 0
+    minutes = scalars["seconds"][-1] / 60.0 if samples else 0.0
+    rate = samples / (60.0 * minutes) if minutes else 0.0
+    how = (
+        'acting on the character\'s own action, with no policy below ("Scratch")'
+        if config.low == NONE
+        else f"by latents that the policy of `{config.low}` (`{choices.agent}`) follows"
+    )
+    unit = "control steps of 1/30 s" if steps == 1 else f"decisions of {steps} control steps of 1/30 s"
+    return (
+        f"A policy learned the task `{choices.task}` {how}, with the budget `{choices.budget}`, seed {config.seed}: "
+        f"{samples:,} samples ({unit}, {samples * steps / 30 / 3600:.1f} simulated hours) in {minutes:.1f} minutes, "
+        f"{rate:,.0f} samples/s, in {config.num_envs} worlds.\n\n{common.made_on(versions)}"
+    )
+
+
+def _figures(config: Any, results: dict[str, Any] | None) -> str:
+    if results is None:
+        return ""
+    random = (
+        " Random latents, drawn anew for every decision, are what the low-level policy gives without one above it."
+        if config.low != NONE
+        else ""
+    )
+    return "\n\n".join(
+        text
+        for text in (
+            "## Does it do the task?",
+            f"{results['trajectories']:,} episodes for each, begun as `env.starts` says, with mean actions, after "
+            f"{results['samples']:,} samples, seed {results['seed']}.{random}",
+            table.markdown(results),
+            table.meanings(results),
+            table.published(results["task"]),
+        )
+        if text
+    )
+
+
+def _going_on(folder: Path, config: Any, scalars: Scalars) -> str:
+    samples = int(scalars["samples"][-1]) if len(scalars["samples"]) else 0
+    run = shlex.quote(str(folder))
+    lines = [
+        "# train this run on, for an hour at most",
+        f"murmillo train run.resume={run} runner.max_minutes=60 runner.samples={max(5_000_000, 2 * samples)}",
+        "# another film, and surer figures",
+        f"murmillo record run={run} seconds=20",
+        f"murmillo evaluate run={run} worlds=1024",
+    ]
+    if config.low != NONE:
+        lines += [
+            "# the same task without a policy below, and the two side by side",
+            f"murmillo train task={config.choices.task} low=none run.name=scratch",
+            f"murmillo compare {run} {shlex.quote(str(folder.parent / 'scratch'))}",
+        ]
+    return "\n".join(["## How to go on", "", "```", *lines, "```"])

@@ -1,0 +1,107 @@
+"""One run of a task from its settings to its report: build, train, measure, film, report."""
+
+import dataclasses
+import time
+from pathlib import Path
+from typing import Any
+
+import torch
+
+from murmillo.agents.common import checkpoint
+from murmillo.agents.common.logger import Logger
+from murmillo.agents.common.runner import Runner
+from murmillo.cli import runs, versions
+from murmillo.cli.evaluation.identity import clip_digests
+from murmillo.cli.progress import make_progress
+from murmillo.cli.tasks import low, report
+from murmillo.cli.tasks.checks import check_settings
+from murmillo.cli.tasks.config import TaskTrainConfig
+from murmillo.cli.tasks.evaluating import evaluate
+from murmillo.cli.tasks.low import LowRun
+from murmillo.cli.tasks.metrics import training_metrics
+from murmillo.cli.tasks.world import World, make_policy, policy_meta
+from murmillo.cli.training import describe, film, stopping, undone_by_mistakes
+from murmillo.envs.motion.licences import terms_of
+
+
+def train(config: TaskTrainConfig, suffix: str = "") -> int:
+    """Train as the settings say; 0 also where a signal ended it early. `suffix` is put behind a default name.
+
+    Raises:
+        CommandError, SuiteError, AgentError: a mistake in the settings; a new run's folder is then not left behind.
+    """
+    below = low.find(config.low)
+    check_settings(config, below)
+    resuming = config.run.resume is not None
+    choices = config.choices
+    name = config.run.name or runs.default_name(
+        f"{choices['task']}-{choices['agent']}", choices["budget"], config.seed, suffix
+    )
+    folder = Path(config.run.resume) if config.run.resume else runs.vacant(config.run.root, name)
+    config.run.name = name
+    if resuming:
+        low.check_unchanged(below, checkpoint.load(folder / runs.LAST))
+    torch.set_num_threads(config.threads or versions.usable_cores())
+    world = World(config, below, config.num_envs, judged=True)
+    try:
+        if not resuming:
+            runs.make(folder)
+        with undone_by_mistakes(folder, resuming):
+            describe(folder, config)
+            return _train(config, below, world, folder, resuming)
+    finally:
+        world.close()
+
+
+def _train(config: TaskTrainConfig, below: LowRun | None, world: World, folder: Path, resuming: bool) -> int:
+    policy, generator = make_policy(config, world)
+    logger = Logger(folder)
+    meta = policy_meta(config, world)
+    runner = Runner(world.decisions, policy, config.runner, generator, folder / runs.LAST, meta=meta, logger=logger)
+    if resuming:
+        runner.load(folder / runs.LAST)
+    # after loading: they are kept with a checkpoint, and need not be those here
+    terms = dataclasses.asdict(terms_of(world.env.library.clips))
+    runner.meta |= {"terms": terms, **low.identity(below)}
+    runs.write_json(folder / runs.TERMS, terms)
+    runs.write_json(folder / runs.CLIPS, clip_digests(world.env.library.clips))
+    metrics = training_metrics(config.latent_env.steps)
+    progress = make_progress(config.runner.samples, runner.samples, config.runner.max_minutes, metrics)
+    with progress, stopping(runner.stop, progress) as stopped:
+        over = "on its own" if below is None else f"over {below.word} ({below.kind})"
+        progress.say(f"{folder}: {config.choices['task']} {over}, {config.num_envs} worlds")
+        begun = time.monotonic()
+        runner.on_iteration = [
+            lambda scalars: progress.show(int(scalars["samples"]), time.monotonic() - begun, scalars)
+        ]
+        runner.on_warning = [lambda text: progress.say(f"warning: {text}")]
+        runner.run()
+    runs.write_json(folder / runs.NOTICES, [dataclasses.asdict(notice) for notice in runner.watch.notices])
+    logger.close()
+    if stopped():
+        for name in (runs.MEASURES, runs.METRICS):  # of this run when it had ended before: no longer its figures
+            (folder / name).unlink(missing_ok=True)
+        report.write(folder)
+        print(f"stopped at {runner.samples:,} samples; go on with: murmillo train run.resume={folder}")
+        return 0
+    _finish(config, below, folder)
+    return 0
+
+
+def _finish(config: TaskTrainConfig, below: LowRun | None, folder: Path) -> None:
+    """Measure the policy beside what it is to be better than, film it, write the report."""
+    print("measuring the policy before and after training", flush=True)
+    results: dict[str, Any] = evaluate(config, below, folder, config.run.measured_worlds)
+    runs.write_json(folder / runs.MEASURES, _flat(results))
+    if config.run.video:
+        film(folder)
+    print(f"the report: {report.write(folder)}")
+
+
+def _flat(results: dict[str, Any]) -> dict[str, dict[str, float]]:
+    """Figures by player and name, and how many episodes they are of."""
+    measures: dict[str, dict[str, float]] = {}
+    for name, figure in results["metrics"]["task"]["figures"].items():
+        for player, value in figure["values"].items():
+            measures.setdefault(player, {"episodes": results["trajectories"]})[name] = value["value"]
+    return measures
