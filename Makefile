@@ -14,11 +14,11 @@ $(INSTALLED): pyproject.toml constraints.txt
 	$(BIN)/python -m pip install --disable-pip-version-check --quiet -c constraints.txt -e '.[dev]'
 	touch $@
 
-train: $(INSTALLED)  ## train ASE on the built-in clips for about 8 minutes; ARGS="seed=2" adds settings
+train: $(INSTALLED)  ## train ASE on the built-in clips for seven minutes at most; ARGS="seed=2" adds settings
 	$(BIN)/murmillo train $(ARGS)
 
 test: $(INSTALLED)  ## run the tests; ARGS="-k rotations" adds pytest's options
-	$(BIN)/python -m pytest $(ARGS)
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile $(ARGS)
 
 lint: $(INSTALLED)  ## ruff and the import contracts
 	$(BIN)/ruff check .

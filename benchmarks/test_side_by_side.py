@@ -5,6 +5,7 @@ the ratios are taken within the rounds. A control step of this character is four
 EnvPool's Humanoid has 23 degrees of freedom to our 37 and takes five substeps of 1/333 s.
 """
 
+import importlib
 import importlib.util
 import os
 import time
@@ -169,8 +170,7 @@ def _spread(ratios: list[float]) -> str:
 
 
 def _envpool(worlds: int) -> Any:
-    import envpool
-
+    envpool = importlib.import_module("envpool")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         return envpool.make_gymnasium("Humanoid-v4", num_envs=worlds, num_threads=os.cpu_count())
