@@ -11,6 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.cli.refusals import assert_refused
+
 Murmillo = Callable[..., tuple[int, str, str]]
 
 
@@ -20,15 +22,6 @@ def pack(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("pack") / "clips"
     shutil.copytree(str(files("murmillo.assets.motions") / "sword_shield"), folder)
     return folder
-
-
-def assert_refused(done: tuple[int, str, str], *parts: str) -> None:
-    status, _, err = done
-    assert status == 2, err
-    assert err.startswith("murmillo: ")
-    assert err.count("\n") == 1, err
-    for part in parts:
-        assert part in err
 
 
 @pytest.mark.parametrize(

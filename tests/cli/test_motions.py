@@ -13,6 +13,7 @@ from murmillo.envs.motion import Clip, load_clips, save_clips
 from murmillo.envs.motion.editing import trim
 from murmillo.envs.motion.manifest import MANIFEST
 from tests.cli.conftest import Done
+from tests.cli.refusals import assert_refused
 
 Murmillo = Callable[..., Done]
 CHARACTER = load_character("sword_shield")
@@ -200,11 +201,7 @@ def test_mistakes(murmillo: Murmillo, folder: Path, words: tuple[str, ...], part
     (folder / "full/notes.txt").touch()
     (folder / "file").touch()
     done = murmillo("motions", *words)
-    assert done.status == 2, done.out
-    assert done.err.startswith("murmillo: ")
-    assert done.err.count("\n") == 1, done.err
-    for part in parts:
-        assert part in done.err
+    assert_refused(done, *parts)
     assert sorted(path.name for path in folder.rglob("*")) == ["file", "full", "notes.txt"]
 
 

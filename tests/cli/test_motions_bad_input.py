@@ -12,6 +12,7 @@ import pytest
 
 from tests.cli.conftest import Done
 from tests.cli.motion_files import amass, bvh
+from tests.cli.refusals import assert_refused
 
 pytest.importorskip("mink", reason="retargeting needs the motion extra: pip install murmillo[motion]")
 
@@ -131,11 +132,7 @@ def test_a_bad_file_is_refused(murmillo: Murmillo, folder: Path, kind: str) -> N
     write(folder / name)
     before = sorted(folder.rglob("*"))
     done = murmillo("motions", "import", name, "--to", "clips", "--jobs", "1", "--report", "import.md")
-    assert done.status == 2, done.out
-    assert done.err.startswith("murmillo: ")
-    assert done.err.count("\n") == 1, done.err
-    for part in (name, *parts):
-        assert part in done.err
+    assert_refused(done, name, *parts)
     assert "murmillo fails on this file" not in done.err
     assert sorted(folder.rglob("*")) == before
 
@@ -199,9 +196,5 @@ def test_mistakes_are_told_before_the_work(
     (folder / "walk.bvh").write_text(bvh(4))
     (folder / "empty").mkdir()
     done = murmillo("motions", "import", *words)
-    assert done.status == 2, done.out
-    assert done.err.startswith("murmillo: ")
-    assert done.err.count("\n") == 1, done.err
-    for part in parts:
-        assert part in done.err
+    assert_refused(done, *parts)
     assert sorted(path.name for path in folder.iterdir()) == ["empty", "walk.bvh"]

@@ -19,6 +19,7 @@ from murmillo.cli.main import main
 from murmillo.cli.tasks.checks import check_settings
 from murmillo.cli.tasks.config import compose_task
 from murmillo.cli.tasks.names import task_names
+from tests.cli.refusals import assert_refused
 
 Murmillo = Callable[..., tuple[int, str, str]]
 
@@ -66,15 +67,6 @@ def own(located: Path, folder: Path) -> Path:
 def rows(folder: Path) -> list[dict[str, str]]:
     with (folder / "scalars.csv").open(newline="") as file:
         return list(csv.DictReader(file))
-
-
-def assert_refused(done: tuple[int, str, str], *parts: str) -> None:
-    status, _, err = done
-    assert status == 2, err
-    assert err.startswith("murmillo: ")
-    assert err.count("\n") == 1, err
-    for part in parts:
-        assert part in err
 
 
 # --- composing -------------------------------------------------------------------------------------------------------
