@@ -25,6 +25,7 @@ _LEAST = {
         "warm_start.pairs",
         "warm_start.minibatch",
         "run.measured_worlds",
+        "run.keep_every",
     ),
     0: ("runner.max_minutes", "runner.checkpoint_minutes", "warm_start.steps"),
 }
@@ -91,7 +92,7 @@ def check_clips(config: TrainConfig) -> None:
         CommandError: a window is longer than every clip, or the clips have another number of labels.
         MotionError: the clips cannot be used.
     """
-    clips = load_clips(config.env.motions, load_character(config.env.character))
+    clips = load_clips(config.env.motions, load_character(config.env.character), config.env.clips)
     longest = max(clip.duration for clip in clips)
     for name, frames in _windows(config.agent):
         span = (frames - 1) * CONTROL_DT

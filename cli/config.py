@@ -40,6 +40,7 @@ class RunConfig:
         resume: folder of a run to take up again, with its own settings.
         measured_worlds: episodes that the policy is measured in at the end, and trajectories of its evaluation.
         evaluate: measure the quick metrics of `murmillo evaluate` at the end.
+        keep_every: samples after which a checkpoint is kept for `murmillo evaluate checkpoint=all`; None keeps none.
         video: film the trained character at the end.
     """
 
@@ -48,6 +49,7 @@ class RunConfig:
     resume: str | None = None
     measured_worlds: int = 64
     evaluate: bool = True
+    keep_every: int | None = None
     video: bool = True
 
 
@@ -59,6 +61,7 @@ class TrainConfig:
         agent: the chosen agent's configuration.
         choices: the files of `conf/` that this was put together from, by group.
         motions: "builtin", a folder of clips or one file.
+        clips: names of those of them that are learned, or patterns such as "walk_*"; empty for all.
         skills: how many labels the clips must have; None takes what they have.
         num_envs: worlds that are simulated together.
         seed: of everything random.
@@ -72,6 +75,7 @@ class TrainConfig:
     run: RunConfig = field(default_factory=RunConfig)
     choices: dict[str, str] = field(default_factory=dict)
     motions: str = "builtin"
+    clips: tuple[str, ...] = ()
     skills: int | None = None
     num_envs: int = 4096
     seed: int = 1

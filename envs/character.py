@@ -1,6 +1,6 @@
 """The character as its MJCF has it: names, layouts, action targets, kinematics. Nothing of it is written elsewhere."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import cached_property
 from importlib.resources import files
 from typing import Literal
@@ -41,12 +41,14 @@ class Character:
         key_bodies, key_sites: names of the K key points, and the ids of their sites in the model.
         feet: the bodies that may touch the ground.
         contact_slice: where the model's sensor data hold the ground's force on each body, [B * 3] [N].
+        base: the character as it was before its body was changed, whose clips it follows; itself where it was not.
+        pruned: the actions of `base` that it has no joint for.
         action_offset, action_scale: [A] [rad], float64.
         joint_limits: [A, 2] lowest and highest joint coordinate [rad], float64: of a hinge its range, of a ball joint
             the box of its exponential map (the MJCF's `user`), which the engine does not enforce.
     """
 
-    def __init__(self, name: str, spec: mujoco.MjSpec) -> None:
+    def __init__(self, name: str, spec: mujoco.MjSpec, base: "Character | None" = None) -> None:
         self.name = name
         self.control_dt = CONTROL_DT
         self._spec = spec
@@ -70,6 +72,12 @@ class Character:
         self.action_offset = 0.5 * (low + high)
         self.action_scale = 0.5 * (high - low)
         self.joint_limits = torch.from_numpy(np.vstack([joint_box(model, joint.name) for joint in self.joints]))
+        self.base = base or self
+        names = {joint.name for joint in self.joints}
+        kept = [joint for joint in self.base.joints if joint.name in names]
+        self.pruned = tuple(sorted(set(range(self.base.action_dim)) - set(_columns(joint.action for joint in kept))))
+        self._kept_qpos = [*range(7), *_columns(joint.qpos for joint in kept)]
+        self._kept_dof = [*range(6), *_columns(joint.dof for joint in kept)]
 
     @property
     def action_dim(self) -> int:
@@ -113,6 +121,26 @@ class Character:
     def forward_kinematics(self, qpos: Tensor) -> tuple[Tensor, Tensor]:
         """Body frames in the world of the pose qpos [..., nq]: positions [..., B, 3] [m], quaternions [..., B, 4]."""
         return self._tree(qpos)
+
+    def velocities(self, body_pos_w: Tensor, body_quat_w: Tensor, qvel: Tensor) -> tuple[Tensor, Tensor]:
+        """Velocities of body frames [..., B, 3], [..., B, 4] at qvel [..., nv]: linear and angular [..., B, 3].
+
+        Those of the frames' origins [m/s] and of the bodies [rad/s], in world axes.
+        """
+        return self._tree.velocities(body_pos_w, body_quat_w, qvel)
+
+    def from_base(self, qpos: Tensor, qvel: Tensor) -> tuple[Tensor, Tensor]:
+        """Poses [..., nq] and velocities [..., nv] of `base` in this character's layout, without what is locked."""
+        return (qpos[..., self._kept_qpos], qvel[..., self._kept_dof]) if self.pruned else (qpos, qvel)
+
+    def to_base(self, qpos: Tensor, qvel: Tensor) -> tuple[Tensor, Tensor]:
+        """This character's poses [..., nq] and velocities [..., nv] in the layout of `base`; locked joints rest."""
+        if not self.pruned:
+            return qpos, qvel
+        full_qpos = self.base.default_qpos.to(qpos).repeat(*qpos.shape[:-1], 1)
+        full_qvel = qvel.new_zeros(*qvel.shape[:-1], self.base.model.nv)
+        full_qpos[..., self._kept_qpos], full_qvel[..., self._kept_dof] = qpos, qvel
+        return full_qpos, full_qvel
 
     def key_positions(self, qpos: Tensor) -> Tensor:
         """Key points [..., K, 3] [m] of the pose qpos [..., nq]; they lie at their bodies' origins."""
@@ -167,6 +195,10 @@ def without_visuals(spec: mujoco.MjSpec) -> mujoco.MjSpec:
         if geom.group == _VISUAL_GROUP:
             bare.delete(geom)
     return bare
+
+
+def _columns(slices: Iterable[slice]) -> list[int]:
+    return [column for part in slices for column in range(part.start, part.stop)]
 
 
 def _refuse_offsets(name: str, model: mujoco.MjModel) -> None:

@@ -5,9 +5,13 @@ from typing import Literal
 
 from gymnasium.vector import AutoresetMode
 
+from murmillo.envs.bodies import BodyConfig
 from murmillo.envs.errors import SuiteError
 from murmillo.envs.falls import FallConfig
+from murmillo.envs.features import FEATURES
 from murmillo.envs.starts import StartConfig
+from murmillo.envs.tasks.pushes import PushConfig
+from murmillo.envs.terrain import TerrainConfig
 
 
 @dataclass
@@ -16,20 +20,30 @@ class EnvConfig:
 
     Attributes:
         motions: "builtin", a folder of clips or one file.
+        clips: names of those of them that are used, or patterns such as "walk_*"; empty for all.
         character: an MJCF of `assets/mjcf`.
-        window: frames of `state` that the observation `window` holds, the newest last; 1 leaves it out.
+        body: how its body differs from the MJCF: a shape, factors on links, locked joints.
+        features: how the character is seen: "character", the state of ASE, CALM and C.ASE, or "links", AdaptNet's
+            (`murmillo.envs.features`).
+        window: frames that the observation `window` holds, the newest last; 1 leaves it out.
         episode_steps: control steps until an episode is truncated (300 steps are 10 s).
         residual_force: scale of the skeletal residual forces [N] (C.ASE section 3.1); 0 takes them out of the action.
         residual_reward: form of their regularising reward (`ResidualForces.reward`), "sum" (paper) or "mean" (code).
         autoreset: gymnasium's autoreset mode of the vector environment.
         threads: CPU threads of the physics; 0 takes every CPU.
         camera, width, height: of the frames of `render_mode="rgb_array"`.
+        friction: range of the ground's friction, drawn for each episode; None is the MJCF's, which is 1.
+        terrain: the ground's shape; what is not flat is observed too.
+        pushes: pushes at random, whatever the task.
         fall: what ends an episode.
         starts: how one begins.
     """
 
     motions: str = "builtin"
+    clips: tuple[str, ...] = ()
     character: str = "sword_shield"
+    body: BodyConfig = field(default_factory=BodyConfig)
+    features: Literal["character", "links"] = "character"
     window: int = 1
     episode_steps: int = 300
     residual_force: float = 0.0
@@ -39,6 +53,9 @@ class EnvConfig:
     camera: str = "track"
     width: int = 640
     height: int = 480
+    friction: tuple[float, float] | None = None
+    terrain: TerrainConfig = field(default_factory=TerrainConfig)
+    pushes: PushConfig = field(default_factory=PushConfig)
     fall: FallConfig = field(default_factory=FallConfig)
     starts: StartConfig = field(default_factory=StartConfig)
 
@@ -55,8 +72,12 @@ def check_config(config: EnvConfig, render_mode: str | None, modes: list[str]) -
     for name, least in (("window", 1), ("episode_steps", 1), ("residual_force", 0), ("width", 1), ("height", 1)):
         if getattr(config, name) < least:
             raise SuiteError(f"{name}={getattr(config, name)}: needs at least {least}")
+    friction = config.friction
+    if friction is not None and not (len(friction) == 2 and 0.0 <= friction[0] <= friction[1]):
+        raise SuiteError(f"friction={friction}: needs two numbers of at least 0, the lower one first")
     for name, value, known in (
         ("autoreset", config.autoreset, [mode.name.lower() for mode in AutoresetMode]),
+        ("features", config.features, list(FEATURES)),
         ("residual_reward", config.residual_reward, ["sum", "mean"]),
         ("fall.contact", config.fall.contact, ["ground", "any"]),
         ("render_mode", render_mode, [None, *modes]),

@@ -18,10 +18,15 @@ def lowest_point(character: Character, qpos: Tensor) -> Tensor:
 
 def geom_heights(character: Character, qpos: Tensor) -> Tensor:
     """Heights [..., G] [m] of the lowest points of the bodies' G geoms, in the model's order, in the pose [..., nq]."""
+    return geom_places(character, qpos)[1]
+
+
+def geom_places(character: Character, qpos: Tensor) -> tuple[Tensor, Tensor]:
+    """Centres [..., G, 3] of the bodies' geoms in the world, and heights [..., G] of their lowest points [m]."""
     pos, quat = character.forward_kinematics(qpos)
     geoms = _geoms(character)
     quat = quat[..., geoms.body, :]
-    centre = pos[..., geoms.body, 2] + quat_rotate(quat, geoms.pos.to(qpos))[..., 2]
+    centre = pos[..., geoms.body, :] + quat_rotate(quat, geoms.pos.to(qpos))
     w, x, y, z = quat_mul(quat, geoms.quat.to(qpos)).unbind(-1)
     # heights of a geom's own axes: the lowest point is reached along them
     rise_x, rise_y = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x)
@@ -29,7 +34,7 @@ def geom_heights(character: Character, qpos: Tensor) -> Tensor:
     radius, disc, half = geoms.radius.to(qpos), geoms.disc.to(qpos), geoms.half.to(qpos)
     along = half[:, 0] * rise_x.abs() + half[:, 1] * rise_y.abs() + half[:, 2] * rise_z.abs()
     across = disc * (1.0 - rise_z.square()).clamp_min(0.0).sqrt()
-    return centre - radius - along - across
+    return centre, centre[..., 2] - radius - along - across
 
 
 @dataclass(frozen=True)

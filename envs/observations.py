@@ -72,21 +72,29 @@ def feature_mask(character: Character, masked: Collection[str]) -> Tensor:
     Returns:
         [D] bool.
     """
-    layout, model = _layout(character), character.model
+    layout, idle = _layout(character), idle_bodies(character, masked)
     mask = torch.zeros(state_dim(character), dtype=torch.bool)
     rotation, velocity = 13, 13 + layout.width
     for joint in character.joints:
         rotation_end = rotation + (6 if joint.kind == "ball" else 1)
         velocity_end = velocity + joint.dof.stop - joint.dof.start
-        body = int(model.joint(joint.name).bodyid[0])
-        carried = [model.body(child).name for child in range(model.nbody) if model.body_parentid[child] == body]
-        if carried and all(child in masked for child in carried):
+        if character.bodies[int(character.model.joint(joint.name).bodyid[0]) - 1] in idle:
             mask[rotation:rotation_end] = mask[velocity:velocity_end] = True
         rotation, velocity = rotation_end, velocity_end
     mask[-3 * len(character.key_bodies) :] = torch.tensor(
         [body in masked for body in character.key_bodies]
     ).repeat_interleave(3)
     return mask
+
+
+def idle_bodies(character: Character, masked: Collection[str]) -> tuple[str, ...]:
+    """The bodies that carry nothing but these: how they are turned says nothing either."""
+    model, idle = character.model, []
+    for body, name in enumerate(character.bodies, start=1):
+        carried = [model.body(child).name for child in range(model.nbody) if model.body_parentid[child] == body]
+        if carried and all(child in masked for child in carried):
+            idle.append(name)
+    return tuple(idle)
 
 
 @dataclass(frozen=True)

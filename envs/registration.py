@@ -1,5 +1,6 @@
 """Gymnasium ids. They exist after `import murmillo.envs`, or in one go as "murmillo.envs:murmillo/Imitation-v0"."""
 
+from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from difflib import get_close_matches
 from typing import Any
@@ -26,7 +27,7 @@ def register() -> None:
 
 def make(task_name: str, render_mode: Any = None, task: dict[str, Any] | None = None, **kwargs: Any) -> HumanoidEnv:
     """One world; keyword arguments are those of `EnvConfig`, and `task` has those of the task's own."""
-    config = env_config(threads=kwargs.pop("threads", 1), **kwargs)
+    config = env_config(task_name, **{"threads": 1, **kwargs})
     return HumanoidEnv(config, make_task(task_name, **task or {}), render_mode)
 
 
@@ -34,7 +35,7 @@ def make_vector(
     task_name: str, num_envs: int = 1, render_mode: Any = None, task: dict[str, Any] | None = None, **kwargs: Any
 ) -> HumanoidVectorEnv:
     """N worlds; keyword arguments are those of `EnvConfig`, and `task` has those of the task's own."""
-    return HumanoidVectorEnv(num_envs, env_config(**kwargs), make_task(task_name, **task or {}), render_mode)
+    return HumanoidVectorEnv(num_envs, env_config(task_name, **kwargs), make_task(task_name, **task or {}), render_mode)
 
 
 def make_task(name: str, **arguments: Any) -> Task:
@@ -53,13 +54,22 @@ def make_task(name: str, **arguments: Any) -> Task:
     return cls()
 
 
-def env_config(**kwargs: Any) -> EnvConfig:
-    """`EnvConfig` from keyword arguments, in which `fall` and `starts` may be dicts.
+def env_config(task_name: str = "Imitation", **kwargs: Any) -> EnvConfig:
+    """`EnvConfig` from the settings of a task's id and keyword arguments.
+
+    `fall`, `starts`, `body`, ... may be dicts, or strings in place of their first setting: `body="LongThighs"`.
 
     Raises:
         SuiteError: an argument that there is not, with the nearest that there is.
     """
-    return _build(EnvConfig, kwargs, "")
+    return _build(EnvConfig, _joined(TASKS[task_name].settings, kwargs), "")
+
+
+def _joined(settings: Mapping[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
+    """The settings with those over them, dicts within them joined too."""
+    joined = {**settings, **over}
+    both = [name for name in settings if isinstance(settings[name], Mapping) and isinstance(over.get(name), Mapping)]
+    return joined | {name: _joined(settings[name], over[name]) for name in both}
 
 
 def _build(cls: type, values: dict[str, Any], path: str) -> Any:
@@ -71,7 +81,10 @@ def _build(cls: type, values: dict[str, Any], path: str) -> Any:
             hint = f"did you mean {path}{near[0]}?" if near else f"there are: {', '.join(known)}"
             raise SuiteError(f"{path}{name}: no such argument; {hint}")
         factory = known[name].default_factory
-        if isinstance(value, dict) and isinstance(factory, type) and is_dataclass(factory):
-            value = _build(factory, value, f"{path}{name}.")
+        if isinstance(factory, type) and is_dataclass(factory):
+            if isinstance(value, str):  # which stands for the first setting
+                value = {fields(factory)[0].name: value}
+            if isinstance(value, dict):
+                value = _build(factory, value, f"{path}{name}.")
         nested[name] = value
     return cls(**nested)

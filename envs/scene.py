@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 import mujoco
+from torch import Tensor
 
 from murmillo.envs.character import Character, SpecEdit, without_visuals
 from murmillo.envs.errors import SuiteError
@@ -11,7 +12,9 @@ _HIT = "hit_"  # contact sensors of this prefix hold a prop's force on a body
 _GROUND = "ground_"
 
 _ASIDE = 50.0
-"""[m] Where a prop lies until its task puts it somewhere."""
+"""[m] How far ahead of the world's origin props begin."""
+_APART = 10.0
+"""[m] How far they are there from the ground and from each other."""
 
 
 class Scene:
@@ -35,6 +38,9 @@ class Scene:
         self._spec = character.spec()
         if edit is not None:
             edit(self._spec)
+        for sensor in self._spec.sensors:
+            if sensor.name.startswith(_HIT):
+                sensor.nsample = character.substeps
         self.model = without_visuals(self._spec).compile()
         first = len(character.bodies) + 1
         own = tuple(self.model.body(i).name for i in range(1, min(first, self.model.nbody)))
@@ -43,8 +49,10 @@ class Scene:
         self.props = tuple(self.model.body(i).name for i in range(first, self.model.nbody))
         if self.model.nq != character.model.nq + 7 * len(self.props):
             raise SuiteError(f"scene: props ({', '.join(self.props)}) need one free joint each; see add_box")
-        self.hit_slice = self._hit_slice()
-        """Where sensordata holds the props' forces on the bodies, [P * B * 3]."""
+        self._hit_start = self._find_hits()
+        if self.props:
+            # each prop is a tree of its own; what does not touch is solved for apart, which is quicker
+            self.model.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_ISLAND)
 
     def render_model(self, offscreen: tuple[int, int] | None = None) -> mujoco.MjModel:
         """The model with its visual geoms, for pictures; its qpos layout is that of `model`."""
@@ -53,13 +61,35 @@ class Scene:
             spec.visual.global_.offwidth, spec.visual.global_.offheight = offscreen
         return spec.compile()
 
-    def _hit_slice(self) -> slice:
+    def hits(self, history: Tensor) -> Tensor:
+        """[N, P, B, S, 3] the props' forces on the bodies in the last S substeps, those of a control step [N].
+
+        Args:
+            history: [N, H] MuJoCo's sensor history: for each prop and body two words of its own, S times, S forces.
+        """
+        samples, bodies = self.character.substeps, len(self.character.bodies)
+        width = 2 + 4 * samples
+        end = self._hit_start + len(self.props) * bodies * width
+        buffers = history[:, self._hit_start : end].unflatten(1, (len(self.props), bodies, width))
+        return buffers[..., 2 + samples :].unflatten(-1, (samples, 3))
+
+    def _find_hits(self) -> int:
         names = [self.model.sensor(i).name for i in range(self.model.nsensor)]
         wanted = [f"{_HIT}{prop}_{body}" for prop in self.props for body in self.character.bodies]
         if [name for name in names if name.startswith(_HIT)] != wanted:
             raise SuiteError(f"scene: needs one contact sensor {_HIT}<prop>_<body> a body for each prop; see add_box")
-        start = int(self.model.sensor(wanted[0]).adr[0]) if wanted else self.model.nsensordata
-        return slice(start, start + 3 * len(wanted))
+        return int(self.model.sensor_historyadr[names.index(wanted[0])]) if wanted else 0
+
+
+def aside(prop: int) -> tuple[float, float, float]:
+    """Where the prop of this index begins [m]: far from the character and in the air, where it touches nothing."""
+    return (_ASIDE, _APART * prop, _APART)
+
+
+def slippery(spec: mujoco.MjSpec) -> None:
+    """Edit by which the ground's friction is that of its contacts, however rough the body that touches it."""
+    for geom in spec.worldbody.geoms:
+        geom.priority = 1
 
 
 def add_box(
@@ -78,16 +108,19 @@ def add_box(
         size: lengths of its edges [m].
         mass: [kg].
         rgba: its colour.
-        margin: distance [m] at which it is already stopped; at 40 m/s it moves 0.33 m a substep, and would else pass
-            through what is thinner.
+        margin: distance [m] from bodies at which it is already stopped; at 40 m/s it moves 0.33 m a substep, and would
+            else pass through what is thinner. It lies on the ground all the same.
     """
     patterns = [
         sensor for sensor in spec.sensors if sensor.name.startswith(_GROUND)
     ]  # one a body, in the bodies' order
-    box = spec.worldbody.add_body(name=name, pos=[_ASIDE, 0.0, 0.5 * size[2]])
+    box = spec.worldbody.add_body(name=name, pos=aside(len(spec.worldbody.bodies) - 1))
     box.add_freejoint(name=name)
     half = [0.5 * edge for edge in size]
     box.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, name=name, size=half, mass=mass, rgba=rgba, condim=3, margin=margin)
+    if margin:
+        for ground in spec.worldbody.geoms:
+            spec.add_pair(geomname1=ground.name, geomname2=name, condim=3, margin=0.0)
     for pattern in patterns:
         spec.add_sensor(
             name=f"{_HIT}{name}_{pattern.refname}",

@@ -1,6 +1,6 @@
 """How episodes begin: in a clip, in the default pose, fallen, or where the last one fell (ASE section 6.5)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import torch
 from torch import Tensor
@@ -15,7 +15,7 @@ REFERENCE, DEFAULT, FALLEN, RECOVERY = range(4)
 KINDS = ("reference", "default", "fallen", "recovery")
 
 _MOST_AHEAD = 512
-_STOCKED = ("qpos", "qvel", "window")
+_STOCKED = ("qpos", "qvel", "frames")
 
 
 @dataclass
@@ -27,7 +27,7 @@ class StartConfig:
         fallen: of the other episodes, the share that begins in a fallen state.
         reference: of the rest, the share that begins in a clip; the others begin in the default pose.
         free_steps: steps in which a recovery or fallen start may lie on the ground (60 steps are 2 s).
-        default_height: height of the pelvis in the default pose [m].
+        default_height: height of the pelvis in the default pose [m]; with other legs it is higher or lower by as much.
         drop_height: fallen states are dropped from heights of this range [m] (the paper names no range).
         fallen_states: most fallen states that are made; fewer for few worlds.
     """
@@ -48,17 +48,17 @@ class Starts:
     Attributes:
         kind: [n] REFERENCE, DEFAULT, FALLEN or RECOVERY.
         qpos: [n, nq]; qvel: [n, nv].
-        window: [r, W, D] the states of the clips up to the r reference starts.
+        frames: [r, W, D] the frames of the clips up to the r reference starts (`Features.recorded`).
     """
 
     kind: Tensor
     qpos: Tensor
     qvel: Tensor
-    window: Tensor
+    frames: Tensor
 
 
 class StartSampler:
-    """Draws starts by the shares of `StartConfig`; reference starts come with a window of `window` states."""
+    """Draws starts by the shares of `StartConfig`; the library's clips are those of `Character.base`."""
 
     def __init__(
         self,
@@ -66,10 +66,10 @@ class StartSampler:
         library: MotionLibrary,
         config: StartConfig,
         num_envs: int,
-        window: int,
+        frames: int,
         threads: int = 0,
     ) -> None:
-        """`threads` of the physics that makes the fallen states; 0 takes every CPU."""
+        """`frames` come with each reference start; `threads` of the physics for the fallen states, 0 for every CPU."""
         for name in ("recovery", "fallen", "reference"):
             if not 0.0 <= getattr(config, name) <= 1.0:
                 raise SuiteError(f"starts.{name}={getattr(config, name)}: needs a share between 0 and 1")
@@ -77,13 +77,14 @@ class StartSampler:
             raise SuiteError(f"starts.fallen_states={config.fallen_states}: needs at least 1")
         self.config = config
         self._character, self._threads = character, threads
-        self._references = _ReferenceStock(character, library, min(num_envs, _MOST_AHEAD), window)
+        self._references = _ReferenceStock(character, library, min(num_envs, _MOST_AHEAD), frames)
         self._pool_size = min(config.fallen_states, max(16, num_envs))
         self._pool: Tensor | None = None
         self.on_ground = True
         """Whether episodes may begin on the ground: fallen, or where the last one fell."""
         self._default = character.default_qpos.clone()
-        self._default[2] = config.default_height
+        grown = character.default_qpos[2] - character.base.default_qpos[2]
+        self._default[2] = config.default_height + grown
 
     def draw(self, fell: Tensor, generator: torch.Generator, kind: int | None = None) -> Starts:
         """Starts of n worlds; fell [n] bool says whose last episode ended by a fall; `kind` makes all of one kind."""
@@ -98,12 +99,19 @@ class StartSampler:
         qpos = self._default.repeat(n, 1)
         qvel = torch.zeros(n, self._character.model.nv, dtype=torch.float64)
         moving = (kinds == REFERENCE).nonzero().squeeze(-1)
-        qpos[moving], qvel[moving], window = self._references.take(len(moving), generator)
+        qpos[moving], qvel[moving], frames = self._references.take(len(moving), generator)
         fallen = (kinds == FALLEN).nonzero().squeeze(-1)
         if len(fallen):
             pool = self._fallen_states()
             qpos[fallen] = pool[torch.randint(len(pool), (len(fallen),), generator=generator)]
-        return Starts(kinds, qpos, qvel, window)
+        return Starts(kinds, qpos, qvel, frames)
+
+    def moved(self, starts: Starts, by: Tensor) -> Starts:
+        """The starts as they are elsewhere by [n, 3] [m]."""
+        qpos = starts.qpos.clone()
+        qpos[:, :3] += by
+        frames = self._references.moved(starts.frames, by[starts.kind == REFERENCE])
+        return replace(starts, qpos=qpos, frames=frames)
 
     def forget(self) -> None:
         """Throw away what was drawn ahead, as a new seed asks."""
@@ -141,13 +149,13 @@ class StartSampler:
 class _ReferenceStock:
     """Reference starts, made many at a time: a hundred cost little more than one."""
 
-    def __init__(self, character: Character, library: MotionLibrary, batch: int, window: int) -> None:
-        self._character, self._library, self._batch, self._window = character, library, batch, window
+    def __init__(self, character: Character, library: MotionLibrary, batch: int, frames: int) -> None:
+        self._character, self._library, self._batch, self._frames = character, library, batch, frames
         self.stock: tuple[Tensor, ...] | None = None
-        """What is left of qpos [m, nq], qvel [m, nv] and window [m, W, D]."""
+        """What is left of qpos [m, nq], qvel [m, nv] and frames [m, W, D]."""
 
     def take(self, n: int, generator: torch.Generator) -> tuple[Tensor, ...]:
-        """qpos [n, nq], qvel [n, nv] and window [n, W, D] of n starts."""
+        """qpos [n, nq], qvel [n, nv] and frames [n, W, D] of n starts."""
         left = 0 if self.stock is None else len(self.stock[0])
         if self.stock is None or left < n:
             made = self._make(max(self._batch, n - left), generator)
@@ -158,7 +166,14 @@ class _ReferenceStock:
 
     def _make(self, n: int, generator: torch.Generator) -> tuple[Tensor, ...]:
         clip, time = self._library.sample(n, generator)
-        qpos, qvel = self._library.pose(clip, time)
+        qpos, qvel = self._character.from_base(*self._library.pose(clip, time))
         # lifted out of the floor, which would throw them into the air
-        qpos[:, 2] += (-lowest_point(self._character, qpos)).clamp_min(0.0)
-        return qpos.double(), qvel.double(), self._library.window(clip, time, self._window)
+        lift = (-lowest_point(self._character, qpos)).clamp_min(0.0)
+        qpos[:, 2] += lift
+        frames = self._library.frames(clip, time, self._frames)
+        rise = torch.nn.functional.pad(lift.unsqueeze(-1), (2, 0))
+        return qpos.double(), qvel.double(), self.moved(frames, rise)
+
+    def moved(self, frames: Tensor, by: Tensor) -> Tensor:
+        """Frames [n, W, D] of the clips, elsewhere by [n, 3] [m]."""
+        return self._library.features.moved(frames, by)

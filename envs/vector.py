@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import Any, Literal
 
 import gymnasium
+import mujoco
 import numpy as np
 import torch
 from gymnasium.utils import seeding
@@ -11,26 +12,27 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from torch import Tensor
 
-from murmillo.envs.character import Character, load_character
+from murmillo.envs.bodies import load_body
 from murmillo.envs.config import EnvConfig, check_config
 from murmillo.envs.errors import SuiteError
 from murmillo.envs.falls import FallDetector, count_every_contact
+from murmillo.envs.features import make_features
+from murmillo.envs.forces import OutsideForces
 from murmillo.envs.motion import MotionLibrary, load_clips
 from murmillo.envs.motion.demonstrations import Demonstrations
-from murmillo.envs.observations import character_state, state_dim
+from murmillo.envs.observer import Observer, box
 from murmillo.envs.physics import State, make_physics
 from murmillo.envs.rendering import FrameRenderer, Window, make_screen
-from murmillo.envs.residual import ResidualForces
-from murmillo.envs.scene import Scene
+from murmillo.envs.scene import Scene, slippery
+from murmillo.envs.skills import CommandedSkills
 from murmillo.envs.starts import FALLEN, KINDS, RECOVERY, REFERENCE, StartSampler
 from murmillo.envs.tasks import Imitation, Task
-
-STATE_LIMIT = 1e3
-"""Observations are cut off here; no sound simulation comes near (a diverging one may, before it is healed)."""
+from murmillo.envs.tasks.goals import uniform
+from murmillo.envs.terrain import make_terrain
 
 RENDERED_WORLDS = 16
 
-_OWN_STATE = ("steps", "free_steps", "skill", "ended", "fell", "history")
+_OWN_STATE = ("steps", "free_steps", "ended", "fell")
 """What the environment itself carries from step to step, beside the physics and its generator."""
 
 
@@ -38,17 +40,19 @@ class HumanoidVectorEnv(VectorEnv):
     """N worlds of one character, stepped together.
 
     Observations (a dict):
-        state: [N, 120] float32, the table in `murmillo.envs.observations.character_state`.
+        state: [N, 120] float32, the table in `murmillo.envs.observations.character_state`; with `features="links"`
+            [N, 4, 13 B] (`murmillo.envs.features.LinkFeatures`), of which `length` [N] int64 frames count.
+        heights: [N, 35, 35] float32, the ground about the root (only on uneven ground; `Terrain.map`).
         skill: [N] int64, the commanded label, an index into `skills`; random and independent of the start.
-        window: [N, W, 120] float32, the last W states, oldest first (only if `window` > 1). After a reference start its
-            past is the clip's own, after other starts the first state repeated.
+        window: [N, W, 120] float32, the last W states, oldest first (only if `window` > 1); [N, W, 7 B] of links. After
+            a reference start its past is the clip's own, after other starts the first state repeated.
 
     Actions: [N, 31] in [-1, 1], PD targets at the joints (`Character.targets`); with `residual_force` > 0 [N, 76], the
     last 45 being the residual forces at 15 joints in the heading frame, in units of that scale.
 
     Reward: the sum of the task's terms, which `info["reward_terms"]` holds by name.
 
-    End: `terminated` by a fall (`FallConfig`) or by the task, `truncated` after `episode_steps`.
+    End: `terminated` by a fall (`FallConfig`) or by the task, `truncated` after `episode_steps` or off uneven ground.
 
     Info: `reward_terms`, `fall` [N] bool, `healed` [N] bool (a world whose simulation diverged and was reset), and in
     SAME_STEP mode `final_obs`, the observation before any reset for all N worlds, with its mask `_final_obs` [N]. With
@@ -74,28 +78,30 @@ class HumanoidVectorEnv(VectorEnv):
         self.metadata = {**type(self).metadata, "autoreset_mode": self._mode}
         self.task = task or Imitation()
         edit = count_every_contact if config.fall.contact == "any" else None
-        self.character = load_character(config.character, edit)
-        self.scene = Scene(self.character, self.task.edit)
-        self.library = MotionLibrary(load_clips(config.motions, self.character), self.character)
+        self.character = load_body(config.character, config.body, edit)
+        self.terrain = make_terrain(config.terrain)
+        self.scene = Scene(self.character, self._lay_out)
+        features, followed = make_features(config.features, self.character), self.character.base
+        clips = load_clips(config.motions, followed, config.clips)
+        self.library = MotionLibrary(clips, followed, features=features)
+        if self.terrain is not None and self.scene.props:
+            raise SuiteError(f"terrain: the props of {type(self.task).__name__} need level ground; leave it flat")
         self.physics = make_physics(self.scene, num_envs, threads=config.threads)
         self.task.bind(num_envs, self.character)
         self._fallen = FallDetector(self.character, config.fall)
-        self._starts = StartSampler(
-            self.character, self.library, config.starts, num_envs, config.window, config.threads
-        )
-        self._residual = _residual_forces(self.character, config)
+        self._observer = Observer(features, num_envs, config.window, self.terrain)
+        frames = self._observer.frames.shape[1]
+        self._starts = StartSampler(self.character, self.library, config.starts, num_envs, frames, config.threads)
+        self._forces = OutsideForces(self.character, config, num_envs)
         self._set_spaces()
-        self.demonstrations = Demonstrations(self.library, config.window, self._action_dim)
+        self.demonstrations = Demonstrations(self.library, self.character, config.window, self._action_dim)
         self._generator = torch.Generator()
         self._generator.seed()
         self._steps = torch.zeros(num_envs, dtype=torch.int64)
         self._free_steps = torch.zeros(num_envs, dtype=torch.int64)
-        self._skill = torch.zeros(num_envs, dtype=torch.int64)
-        self._skill_weights: Tensor | None = None
+        self._skills = CommandedSkills(self.library.skills, num_envs)
         self._ended = torch.zeros(num_envs, dtype=torch.bool)
         self._fell = torch.zeros(num_envs, dtype=torch.bool)
-        self._history = torch.zeros(num_envs, config.window, state_dim(self.character))
-        self._push_w: Tensor | None = None
         self._screen: FrameRenderer | Window | None = None
 
     @property
@@ -142,9 +148,12 @@ class HumanoidVectorEnv(VectorEnv):
         residual = self._advance(torch.as_tensor(actions))
         terms = {name: term.masked_fill(resetting, 0.0) for name, term in self.task.reward(self.state).items()}
         healed = self.physics.healed()
-        fall = self._fallen(self.state) & (self._steps > 1) & (self._free_steps == 0)
+        fall = self._fallen(self.state, self._observer.ground) & (self._steps > 1) & (self._free_steps == 0)
         terminated = (fall | self.task.terminated(self.state) | healed) & ~resetting
-        truncated = (self._steps >= self.config.episode_steps) & ~terminated & ~resetting
+        over = self._steps >= self.config.episode_steps
+        if self.terrain is not None:
+            over |= ~self.terrain.contains(self.state.qpos)
+        truncated = over & ~terminated & ~resetting
         self._pass_time()
         self._ended, self._fell = terminated | truncated, torch.where(resetting, self._fell, fall)
         info: dict[str, Any] = {
@@ -186,19 +195,11 @@ class HumanoidVectorEnv(VectorEnv):
             skill: its name or its index in `skills`.
             env_ids: the worlds; None is all.
         """
-        if isinstance(skill, str):
-            if skill not in self.skills:
-                raise SuiteError(f"skill={skill}: no such skill; there are: {', '.join(self.skills)}")
-            skill = self.skills.index(skill)
-        if not 0 <= skill < len(self.skills):
-            raise SuiteError(f"skill={skill}: needs an index below {len(self.skills)}, or a name")
-        self._skill[slice(None) if env_ids is None else list(env_ids)] = skill
+        self._skills.command(skill, env_ids)
 
     def set_skill_weights(self, weights: Tensor | None) -> None:
         """Draw the skills of new episodes with these probabilities, [K] and not negative; None draws all alike."""
-        if weights is not None and weights.shape != (len(self.skills),):
-            raise SuiteError(f"skill weights of shape {tuple(weights.shape)}: needs one for each of {len(self.skills)}")
-        self._skill_weights = weights
+        self._skills.weigh(weights)
 
     def set_ground_contact(self, allowed: bool) -> None:
         """Whether bodies other than the feet may touch the ground as `fall` and `starts` say; else any touch is a fall.
@@ -211,18 +212,15 @@ class HumanoidVectorEnv(VectorEnv):
         self._starts.on_ground = allowed
 
     def push(self, force_w: Tensor, body: str | None = None) -> None:
-        """Push the character from outside, throughout the next step and no longer; `state_dict` does not keep it.
+        """Push the character from outside, throughout the next step and no longer; pushes add up.
+
+        `state_dict` does not keep them.
 
         Args:
             force_w: [N, 3] [N] at the body's origin, beside any residual force there.
             body: its name; None is the root.
         """
-        if body is not None and body not in self.character.bodies:
-            raise SuiteError(f"body={body}: no such body; there are: {', '.join(self.character.bodies)}")
-        if force_w.shape != (self.num_envs, 3):
-            raise SuiteError(f"force_w of shape {tuple(force_w.shape)}: needs {(self.num_envs, 3)}")
-        self._push_w = torch.zeros(self.num_envs, len(self.character.bodies), 3, dtype=torch.float64)
-        self._push_w[:, 0 if body is None else self.character.bodies.index(body)] = force_w.double()
+        self._forces.push(force_w, body)
 
     def observation(self) -> dict[str, np.ndarray]:
         """The current observation, which a `set_skill` since the last step has changed."""
@@ -233,33 +231,38 @@ class HumanoidVectorEnv(VectorEnv):
     def state_dict(self) -> dict[str, Any]:
         """All that the next step depends on."""
         parts = {"physics": self.physics.state_dict(), "starts": self._starts.state_dict()}
-        parts["task"] = self.task.state_dict()
+        parts |= {"task": self.task.state_dict(), "forces": self._forces.state_dict()}
         own = {name: getattr(self, f"_{name}").clone() for name in _OWN_STATE}
-        return {**parts, "generator": self._generator.get_state(), **own}
+        seen = {"history": self._observer.frames.clone(), "skill": self._skills.current.clone()}
+        return {**parts, "generator": self._generator.get_state(), **seen, **own}
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Continue from `state_dict`, bit for bit."""
         self.physics.load_state_dict(state["physics"])
         self._starts.load_state_dict(state["starts"])
         self.task.load_state_dict(state["task"])
+        self._forces.load_state_dict(state["forces"])
         self._generator.set_state(state["generator"])
+        self._observer.load(self.state, state["history"])
+        self._skills.current = state["skill"].clone()
         for name in _OWN_STATE:
             setattr(self, f"_{name}", state[name].clone())
 
     # --- inside a step -----------------------------------------------------------------------------------------------
 
+    def _lay_out(self, spec: mujoco.MjSpec) -> None:
+        """Put the ground and the task's props into the scene."""
+        if self.terrain is not None:
+            self.terrain.edit(spec)
+        if self.config.friction is not None:
+            slippery(spec)
+        self.task.edit(spec)
+
     def _set_spaces(self) -> None:
-        width = state_dim(self.character)
-        limit = {"low": -STATE_LIMIT, "high": STATE_LIMIT, "dtype": np.float32}
-        observations: dict[str, gymnasium.Space] = {
-            "state": gymnasium.spaces.Box(shape=(width,), **limit),
-            "skill": gymnasium.spaces.Discrete(len(self.skills)),
-        }
-        if self.config.window > 1:
-            observations["window"] = gymnasium.spaces.Box(shape=(self.config.window, width), **limit)
+        observations = {**self._observer.spaces(), "skill": gymnasium.spaces.Discrete(len(self.skills))}
         if self.task.goal_dim:
-            observations["goal"] = gymnasium.spaces.Box(shape=(self.task.goal_dim,), **limit)
-        self._action_dim = self.character.action_dim + (self._residual.action_dim if self._residual else 0)
+            observations["goal"] = box((self.task.goal_dim,))
+        self._action_dim = self.character.action_dim + self._forces.residual_dim
         self.single_observation_space = gymnasium.spaces.Dict(observations)
         self.single_action_space = gymnasium.spaces.Box(-1.0, 1.0, (self._action_dim,), np.float32)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
@@ -272,28 +275,12 @@ class HumanoidVectorEnv(VectorEnv):
             raise SuiteError(f"action of shape {tuple(action.shape)}: needs {expected}")
         action = action.double()
         joints, extra = action.split([self.character.action_dim, expected[1] - self.character.action_dim], dim=-1)
-        force = self._residual(extra, self.state) if self._residual else None
-        if (push := self.task.push(self.state)) is not None:
-            self.push(push)
-        pushed, self._push_w = self._push_w, None
-        outer = force if pushed is None else pushed if force is None else force + pushed
-        self.physics.step(self.character.targets(joints), outer)
+        force = self._forces.of_step(extra, self.state, self.task.push(self.state))
+        self.physics.step(self.character.targets(joints), force)
         self._steps += 1
         self._free_steps = (self._free_steps - 1).clamp_min(0)
-        self._history = torch.cat((self._history[:, 1:], self._frame().unsqueeze(1)), dim=1)
-        if self._residual is None or force is None:
-            return {}
-        return {
-            "side_rewards": {"residual": self._residual.reward(extra).float().numpy()},
-            "residual_force": force.flatten(1).norm(dim=-1).numpy(),
-            "joint_torque": self.state.actuator_force.norm(dim=-1).numpy(),
-        }
-
-    def _frame(self, env_ids: Tensor | slice = slice(None)) -> Tensor:
-        """[n, 120] the current states of these worlds."""
-        state = self.state
-        qpos, qvel, keys = state.qpos[env_ids], state.qvel[env_ids], state.key_pos_w[env_ids]
-        return character_state(self.character, qpos, qvel, keys).clamp(-STATE_LIMIT, STATE_LIMIT)
+        self._observer.see(self.state)
+        return self._forces.report(self.state)
 
     def _restart(self, mask: Tensor, kind: int | None = None) -> None:
         """New episodes in the worlds of mask [N] bool."""
@@ -302,40 +289,31 @@ class HumanoidVectorEnv(VectorEnv):
             return
         starts = self._starts.draw(self._fell[ids], self._generator, kind)
         moved = starts.kind != RECOVERY
+        if self.terrain is not None:
+            starts = self._starts.moved(starts, self.terrain.settle(self.character, starts.qpos, ids, self._generator))
+        if self.config.friction is not None:
+            self.physics.set_friction(ids, uniform(len(ids), self.config.friction, self._generator))
         self.physics.write(ids[moved], starts.qpos[moved], starts.qvel[moved])
-        history = self._history.clone()
-        history[ids[moved]] = self._frame(ids[moved]).unsqueeze(1)
-        history[ids[starts.kind == REFERENCE], :-1] = starts.window[:, :-1]
-        self._history = history
+        self._observer.begin(self.state, ids[moved], ids[starts.kind == REFERENCE], starts.frames[:, :-1])
         free = (starts.kind == RECOVERY) | (starts.kind == FALLEN)
         self._steps[ids] = 0
         self._free_steps[ids] = torch.where(free, self.config.starts.free_steps, 0)
-        self._skill = self._skill.index_copy(0, ids, self._draw_skills(len(ids)))
+        self._skills.draw(ids, self._generator)
         self._ended = self._ended & ~mask
         self.task.reset(ids, self.state, self._generator)
+        self._forces.reset(ids, self._generator)
 
     def _pass_time(self) -> None:
         """New goals and skills where their time is over."""
         self.task.advance(self.state, self._generator)
+        self._forces.advance(self._generator)
         if self.task.skill_steps:
             due = (self._steps % self.task.skill_steps == 0).nonzero().squeeze(-1)
-            self._skill = self._skill.index_copy(0, due, self._draw_skills(len(due)))
-
-    def _draw_skills(self, n: int) -> Tensor:
-        if self._skill_weights is None:
-            return torch.randint(len(self.skills), (n,), generator=self._generator)
-        return torch.multinomial(self._skill_weights, n, replacement=True, generator=self._generator)
+            if len(due):
+                self._skills.draw(due, self._generator)
 
     def _observation(self) -> dict[str, np.ndarray]:
-        observation = {"state": self._history[:, -1].numpy(), "skill": self._skill.numpy().copy()}
-        if self.config.window > 1:
-            observation["window"] = self._history.numpy()
+        observation = {**self._observer.observation(self._steps), "skill": self._skills.current.numpy().copy()}
         if self.task.goal_dim:
             observation["goal"] = self.task.goal(self.state).numpy()
         return observation
-
-
-def _residual_forces(character: Character, config: EnvConfig) -> ResidualForces | None:
-    if config.residual_force == 0:
-        return None
-    return ResidualForces(character, config.residual_force, config.residual_reward)

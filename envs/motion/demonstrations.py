@@ -3,15 +3,16 @@
 import torch
 from torch import Tensor
 
+from murmillo.envs.character import Character
 from murmillo.envs.motion.library import MotionLibrary
 
 
 class Demonstrations:
     """Draws from a library of clips, in the form in which the environment shows its own worlds."""
 
-    def __init__(self, library: MotionLibrary, window: int, action_dim: int) -> None:
-        """Windows have `window` frames unless asked otherwise; actions have `action_dim` components."""
-        self._library, self._window, self._action_dim = library, window, action_dim
+    def __init__(self, library: MotionLibrary, character: Character, window: int, action_dim: int) -> None:
+        """Windows have `window` frames unless asked otherwise; actions of `character` have `action_dim` components."""
+        self._library, self._character, self._window, self._action_dim = library, character, window, action_dim
 
     def __call__(
         self, n: int, generator: torch.Generator, skill: Tensor | None = None, frames: int | None = None
@@ -33,10 +34,11 @@ class Demonstrations:
 
     def imitation_pairs(self, n: int, generator: torch.Generator) -> dict[str, Tensor]:
         """`state` [n, 120] of the clips, their `skill` [n], and the `action` [n, A] that targets the next pose."""
-        library, character = self._library, self._library.character
+        library, character = self._library, self._character
         clip, time = library.sample(n, generator)
-        qpos_next, _ = library.pose(clip, time + character.control_dt)
+        qpos_next, qvel_next = library.pose(clip, time + character.control_dt)
         action = torch.zeros(n, self._action_dim)
-        action[:, : character.action_dim] = character.action_for(qpos_next)
-        state = library.window(clip, time, 1)[:, 0]
-        return {"state": state, "skill": library.clip_skill[clip], "action": action}
+        action[:, : character.action_dim] = character.action_for(character.from_base(qpos_next, qvel_next)[0])
+        features = library.features
+        frames, full = library.frames(clip, time, features.frames), torch.full((n,), features.frames)
+        return {**features.state(frames, full), "skill": library.clip_skill[clip], "action": action}

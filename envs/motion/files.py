@@ -1,6 +1,9 @@
 """Loading clips, whatever they are stored as, and saving them."""
 
 import os
+from collections.abc import Sequence
+from difflib import get_close_matches
+from fnmatch import fnmatchcase
 from importlib import resources
 from pathlib import Path
 
@@ -18,7 +21,7 @@ __all__ = ["BUILTIN", "load_clips", "save_clips"]
 BUILTIN = "builtin"
 
 
-def load_clips(path: str | Path, character: Character) -> list[Clip]:
+def load_clips(path: str | Path, character: Character, names: Sequence[str] = ()) -> list[Clip]:
     """Clips for the character, checked: finite, of its layout, with unit quaternions continuous in sign.
 
     Args:
@@ -29,10 +32,25 @@ def load_clips(path: str | Path, character: Character) -> list[Clip]:
               where there is no yaml;
             - a dataset yaml (`motions: [{file, weight}]`) beside poselib files, or above them;
             - one poselib .npy, or one .npz of a folder with manifest.json.
+        character: whose clips they are.
+        names: of those that are wanted, or patterns such as "walk_*"; empty for all. They keep their order.
 
     Raises:
-        MotionError: nothing there, or a file that is damaged, belongs to another character or asks for code to be run.
+        MotionError: nothing there, a file that is damaged, belongs to another character or asks for code to be run, or
+            a name that no clip has.
     """
+    clips = _load(path, character)
+    for name in names:
+        if not any(fnmatchcase(clip.name, name) for clip in clips):
+            known = [clip.name for clip in clips]
+            near = get_close_matches(name, known, n=1)
+            listed = ", ".join(known[:8] + ["…"] * (len(known) > 8))
+            hint = f"did you mean {near[0]}?" if near else f"there are: {listed}"
+            raise MotionError(f"clips={name[:80]}: no clip of motions={path} is called so; {hint}")
+    return [clip for clip in clips if not names or any(fnmatchcase(clip.name, name) for name in names)]
+
+
+def _load(path: str | Path, character: Character) -> list[Clip]:
     if str(path) == BUILTIN:
         return _load_builtin(character)
     path = Path(path)

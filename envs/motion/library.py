@@ -1,4 +1,4 @@
-"""A library of clips as tensors: sampling, poses at any time, and windows of the state for discriminators."""
+"""A library of clips as tensors: sampling, poses at any time, and windows of features for discriminators."""
 
 from collections.abc import Sequence
 from difflib import get_close_matches
@@ -9,9 +9,9 @@ from torch import Tensor
 
 from murmillo.envs.character import CONTROL_DT, Character
 from murmillo.envs.errors import MotionError
+from murmillo.envs.features import CharacterFeatures, Features
 from murmillo.envs.motion.clip import Clip, check_clip
 from murmillo.envs.motion.velocities import clip_velocities
-from murmillo.envs.observations import character_state, feature_mask
 from murmillo.envs.rotations import slerp
 
 _ON_FRAME = 1e-4
@@ -27,20 +27,29 @@ class MotionLibrary:
         clip_skill: [C] int64 index into `skills`.
         weight: [C] float64 sampling weights, as the clips have them.
         duration: [C] float64 [s].
-        mask: [C, D] bool, true where the clip says nothing of a feature of the state; None where all say everything.
+        mask: [C, D] bool, true where the clip says nothing of a feature of a window; None where all say everything.
+        features: the form of windows.
     """
 
-    def __init__(self, clips: Sequence[Clip], character: Character, device: str | torch.device = "cpu") -> None:
+    def __init__(
+        self,
+        clips: Sequence[Clip],
+        character: Character,
+        device: str | torch.device = "cpu",
+        features: Features | None = None,
+    ) -> None:
+        """`features` are those of `character`; without, the papers' state (`CharacterFeatures`)."""
         if not clips:
             raise MotionError("a motion library needs at least one clip; there is none")
         self.character = character
+        self.features = features or CharacterFeatures(character)
         self.device = torch.device(device)
         self.clips = tuple(check_clip(clip, character) for clip in clips)
         self.skills = tuple(sorted({clip.label for clip in clips}))
         self.clip_skill = torch.tensor([self.skills.index(clip.label) for clip in clips], device=self.device)
         self.weight = torch.tensor([clip.weight for clip in clips], dtype=torch.float64, device=self.device)
         self.duration = torch.tensor([clip.duration for clip in clips], dtype=torch.float64, device=self.device)
-        masks = torch.stack([feature_mask(character, clip.masked) for clip in self.clips])
+        masks = torch.stack([self.features.mask(clip.masked) for clip in self.clips])
         self.mask = masks.to(self.device) if masks.any() else None
         self._fps = torch.tensor([clip.fps for clip in clips], dtype=torch.float64, device=self.device)
         starts = list(accumulate((clip.frames for clip in clips), initial=0))
@@ -53,7 +62,7 @@ class MotionLibrary:
         self._quat_columns = [slice(3, 7), *(joint.qpos for joint in character.joints if joint.kind == "ball")]
         self._quat = torch.stack([self._qpos[:, columns] for columns in self._quat_columns], dim=1)
         self._steps = _frames_of_a_step([clip.fps for clip in clips], self.device)
-        self._features: Tensor | None = None
+        self._frames: Tensor | None = None
         self._by_skill = torch.argsort(self.clip_skill, stable=True)
         self._cumulative = torch.cumsum(self.weight[self._by_skill], 0)
         counts = torch.bincount(self.clip_skill, minlength=len(self.skills))
@@ -143,36 +152,38 @@ class MotionLibrary:
         return self.window(clip, torch.minimum(0.5 * self.duration[clip] + half, self.duration[clip]), frames)
 
     def window(self, clip: Tensor, time: Tensor, frames: int) -> Tensor:
-        """Windows of the state that end at these moments.
+        """Windows that end at these moments, as `Features.window` makes them.
 
         Args:
             clip: [n] int64.
             time: [n] [s].
-            frames: states in a window, one control step apart.
+            frames: in a window, one control step apart.
 
         Returns:
-            [n, frames, 120] float32, oldest first. Before the clip begins its first frame is repeated.
+            [n, frames, D] float32, oldest first. Before the clip begins its first frame is repeated.
         """
-        if (known := self._known_window(clip, time, frames)) is not None:
+        return self.features.window(self.frames(clip, time, frames))
+
+    def frames(self, clip: Tensor, time: Tensor, frames: int) -> Tensor:
+        """The frames `Features.recorded` [n, frames, frame_dim] that end at these moments; see `window`."""
+        if (known := self._known_frames(clip, time, frames)) is not None:
             return known
         back = torch.arange(frames - 1, -1, -1, dtype=torch.float64, device=self.device) * CONTROL_DT
         times = time.double().unsqueeze(-1) - back
         qpos, qvel = self.pose(clip.repeat_interleave(frames), times.flatten())
-        state = character_state(self.character, qpos, qvel, self.character.key_positions(qpos))
-        return state.unflatten(0, (len(clip), frames))
+        return self.features.recorded(qpos, qvel).unflatten(0, (len(clip), frames))
 
-    def _known_window(self, clip: Tensor, time: Tensor, frames: int) -> Tensor | None:
-        """The window where all its moments are frames of the clips, out of features made once; else None."""
+    def _known_frames(self, clip: Tensor, time: Tensor, frames: int) -> Tensor | None:
+        """`frames` where all its moments are frames of the clips, out of what was made once; else None."""
         frame = time.double() * self._fps[clip]
         nearest = frame.round()
         if self._steps is None or ((frame - nearest).abs() > _ON_FRAME).any():
             return None
-        if self._features is None:
-            state = character_state(self.character, self._qpos, self._qvel, self.character.key_positions(self._qpos))
-            self._features = state
+        if self._frames is None:
+            self._frames = self.features.recorded(self._qpos, self._qvel)
         back = torch.arange(frames - 1, -1, -1, device=self.device) * self._steps[clip].unsqueeze(-1)
         last = torch.minimum(nearest.long() + self._first[clip], self._last[clip]).unsqueeze(-1)
-        return self._features[torch.maximum(last - back, self._first[clip].unsqueeze(-1))]
+        return self._frames[torch.maximum(last - back, self._first[clip].unsqueeze(-1))]
 
 
 def _frames_of_a_step(fps: Sequence[float], device: torch.device) -> Tensor | None:

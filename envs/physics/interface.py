@@ -70,6 +70,13 @@ class Physics(Protocol):
         """
         ...
 
+    def set_friction(self, env_ids: Tensor, friction: Tensor) -> None:
+        """Give the ground of the worlds env_ids [n] a coefficient of sliding friction [n] from now on.
+
+        It is that of every contact with the ground if the scene was laid out so (`slippery`), else at least that.
+        """
+        ...
+
     def healed(self) -> Tensor:
         """[N] bool: worlds that the engine reset during the last step because their state had diverged."""
         ...

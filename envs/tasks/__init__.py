@@ -6,6 +6,7 @@ from murmillo.envs.tasks.direction import Direction
 from murmillo.envs.tasks.imitation import Imitation
 from murmillo.envs.tasks.interface import Task
 from murmillo.envs.tasks.location import Location
+from murmillo.envs.tasks.navigate import Navigate
 from murmillo.envs.tasks.path_follow import PathFollow
 from murmillo.envs.tasks.reach import Reach
 from murmillo.envs.tasks.recovery import Recovery
@@ -26,6 +27,7 @@ TASKS: dict[str, type[Task]] = {
     "Strike": Strike,
     "Block": Block,
     "Recovery": Recovery,
+    "Navigate": Navigate,
 }
 """The task of each gymnasium id `murmillo/<name>-v0`."""
 

@@ -27,6 +27,7 @@ Every id takes `gymnasium.make("murmillo/<Task>-v0", ...)` for one world and `gy
 | observation `state` | {state} numbers, the table in `murmillo.envs.observations.character_state`, heading frame |
 | observation `skill` | the commanded skill, an index into `env.unwrapped.skills` |
 | observation `window` | with `window=W` above 1: the last W states, oldest first |
+| with `features="links"` | `state`, `length` and `window` are those of `murmillo.envs.features.LinkFeatures` |
 | observation `goal` | of the tasks that have one, below; the number of columns of each part is in brackets |
 | action | {action} numbers in [-1, 1]: PD targets of the joints (with `residual_force`, 45 more) |
 | reward | the sum of the task's terms, by name in `info["reward_terms"]` |
@@ -75,6 +76,7 @@ def _section(name: str, task: Task) -> str:
         f"- reward: {task.reward_doc}",
         f"- reward of a step: from {low:g} to {high:g}, by which returns are normalised",
         f"- end: {task.end_doc}",
+        *_settings(task),
         "",
     ]
     if task.config_type is None:
@@ -87,6 +89,12 @@ def _section(name: str, task: Task) -> str:
             raise SuiteError(f"{name}: argument {field.name} has no line under Attributes: in its dataclass; add one")
         lines.append(f"| `{field.name}` | `{getattr(example, field.name)!r}` | {_cell(described[field.name])} |")
     return "\n".join([*lines, ""])
+
+
+def _settings(task: Task) -> list[str]:
+    """A line on where the id differs from the defaults of `EnvConfig`."""
+    said = ", ".join(f"`{name}={value!r}`" for name, value in task.settings.items())
+    return [f"- settings, unless told otherwise: {said}"] if said else []
 
 
 def _descriptions(config_type: type) -> dict[str, str]:

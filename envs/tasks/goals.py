@@ -7,6 +7,7 @@ import torch
 from torch import Tensor
 
 from murmillo.envs.character import Character
+from murmillo.envs.errors import SuiteError
 from murmillo.envs.markers import Marker
 from murmillo.envs.physics import State
 from murmillo.envs.rotations import heading
@@ -19,7 +20,7 @@ RED, BLUE = (0.85, 0.2, 0.15, 0.8), (0.15, 0.3, 0.85, 0.8)
 class GoalTask(Task):
     """A task whose goals are drawn for an episode's begin, and anew each time that a random number of steps is over.
 
-    `goals` holds them by name, each [N, ...] float64; a user may write to it to direct the character.
+    `goals` holds them by name, each [N, ...] float64; `command` directs the character.
     """
 
     goal_shapes: Mapping[str, tuple[int, ...]]
@@ -48,6 +49,21 @@ class GoalTask(Task):
         due = (self._steps_left <= 0).nonzero().squeeze(-1)
         if len(due):
             self._redraw(due, state, generator)
+
+    def command(self, env_ids: Tensor, **goals: Tensor) -> None:
+        """Give the worlds env_ids [n] goals of a user's, by name and each [n, ...]; all hold until the episode ends.
+
+        Raises:
+            SuiteError: the task has no goal of that name, or one of another shape.
+        """
+        for name, goal in goals.items():
+            if name not in self.goals:
+                raise SuiteError(f"goal {name}: there is none of that name; there are: {', '.join(self.goals)}")
+            shape = (len(env_ids), *self.goal_shapes[name])
+            if goal.shape != shape:
+                raise SuiteError(f"goal {name} of shape {tuple(goal.shape)}: needs {shape}")
+            self.goals[name][env_ids] = goal.double()
+        self._steps_left[env_ids] = torch.iinfo(torch.int64).max
 
     def state_dict(self) -> dict[str, Any]:
         return {"steps_left": self._steps_left.clone(), **{name: goal.clone() for name, goal in self.goals.items()}}
@@ -96,6 +112,25 @@ def ground_velocity(state: State) -> Tensor:
     It is the velocity at the end of the step; the published code has the mean over the step.
     """
     return state.qvel[:, :2]
+
+
+TARGET_DOCS = {
+    "distance": "of the root from the target, over the ground [m]",
+    "facing": "cosine of the heading and the way to the target, 1 is straight at it",
+    "approach": "speed of the root towards the target [m/s]",
+}
+"""What `towards_target` gives, by name."""
+
+
+def towards_target(state: State, target_w: Tensor) -> dict[str, Tensor]:
+    """How the character stands to a target at target_w [N, 2] on the ground [m]: `TARGET_DOCS`, each [N]."""
+    way = target_w - state.qpos[:, :2]
+    ahead = torch.nn.functional.normalize(way, dim=-1)
+    return {
+        "distance": way.norm(dim=-1),
+        "facing": (ahead * facing(state)).sum(-1),
+        "approach": (ahead * ground_velocity(state)).sum(-1),
+    }
 
 
 def into_heading(state: State, vector_w: Tensor) -> Tensor:

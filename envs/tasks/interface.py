@@ -1,5 +1,6 @@
 """What a task adds to the character: a goal, a reward in named terms, an end. A task knows nothing of agents."""
 
+from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import mujoco
@@ -21,6 +22,8 @@ class Task:
 
     config_type: ClassVar[type | None] = None
     """Dataclass of the task's arguments, which its constructor takes; None where it has none."""
+    settings: ClassVar[Mapping[str, Any]] = {}
+    """Settings of `EnvConfig` that the task's id has, where they differ from the defaults."""
     goal_dim: int = 0
     """Width of `goal`; 0 where a task has none."""
     goal_doc: ClassVar[str] = "none"
@@ -34,6 +37,13 @@ class Task:
     skill_steps: int = 0
     """Control steps after which a new skill is commanded at random; 0 keeps an episode's (C.ASE's user-controlled
     policies have 5)."""
+    quantity_docs: ClassVar[Mapping[str, str]] = {
+        "height": "of the root above the ground [m]",
+        "speed": "of the root over the ground [m/s]",
+    }
+    """What `quantities` gives, by name, with its unit."""
+    place_docs: ClassVar[Mapping[str, str]] = {}
+    """What `places` gives, by name."""
 
     def edit(self, spec: mujoco.MjSpec) -> None:
         """Add the task's props to the character's spec (`murmillo.envs.scene.add_box`)."""
@@ -63,6 +73,14 @@ class Task:
     def terminated(self, state: State) -> Tensor:
         """[N] bool: the episode has come to an end of the task's own."""
         return torch.zeros(self.num_envs, dtype=torch.bool)
+
+    def quantities(self, state: State) -> dict[str, Tensor]:
+        """How things stand, in figures that rules can be written in: those of `quantity_docs`, each [N] float64."""
+        return {"height": state.qpos[:, 2].clone(), "speed": state.qvel[:, :2].norm(dim=-1)}
+
+    def places(self, state: State) -> dict[str, Tensor]:
+        """Where rules can send the character: the points of `place_docs`, each [N, 2] on the ground, world axes [m]."""
+        return {}
 
     def markers(self, state: State, world: int) -> list[Marker]:
         """What a picture of this world shows of its goal."""

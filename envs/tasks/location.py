@@ -1,5 +1,6 @@
 """Going to a place (ASE eq. 20, CALM eq. 12)."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
@@ -9,7 +10,16 @@ from torch import Tensor
 from murmillo.envs.markers import Marker
 from murmillo.envs.physics import State
 from murmillo.envs.tasks.arguments import check_choice, check_number, check_steps
-from murmillo.envs.tasks.goals import GoalTask, facing, ground_velocity, into_heading, square
+from murmillo.envs.tasks.goals import (
+    TARGET_DOCS,
+    GoalTask,
+    facing,
+    ground_velocity,
+    into_heading,
+    square,
+    towards_target,
+)
+from murmillo.envs.tasks.interface import Task
 
 
 @dataclass(frozen=True)
@@ -39,6 +49,8 @@ class Location(GoalTask):
         "0.4 exp(-4 max(0, 1 - v)²) + 0.1 max(0, h·u) with v the speed towards the target (no second term at v ≤ 0), "
         "h·u the cosine of heading and way there; both last terms full where d² < 0.5"
     )
+    quantity_docs: ClassVar[Mapping[str, str]] = {**Task.quantity_docs, **TARGET_DOCS}
+    place_docs: ClassVar[Mapping[str, str]] = {"target": "where to go"}
 
     def __init__(self, config: LocationConfig | None = None) -> None:
         """Raises SuiteError naming the argument that cannot be."""
@@ -74,6 +86,12 @@ class Location(GoalTask):
             "velocity": 0.4 * velocity.masked_fill(there, 1.0).float(),
             "facing": 0.1 * face.masked_fill(there, 1.0).float(),
         }
+
+    def quantities(self, state: State) -> dict[str, Tensor]:
+        return super().quantities(state) | towards_target(state, self.goals["target_w"])
+
+    def places(self, state: State) -> dict[str, Tensor]:
+        return {"target": self.goals["target_w"].clone()}
 
     def markers(self, state: State, world: int) -> list[Marker]:
         return [Marker([*self.goals["target_w"][world].tolist(), 0.1], size=0.15)]

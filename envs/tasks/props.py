@@ -26,7 +26,7 @@ def seen(state: State, prop: int) -> Tensor:
 
 def felt(state: State, prop: int, bodies: list[int], touch: float) -> Tensor:
     """[N] bool: the prop pressed on one of these bodies with more than `touch` along an axis [N]."""
-    return (state.hit_force_w[:, prop, bodies].abs() > touch).any(-1).any(-1)
+    return (state.hit_force_w[:, prop].abs().amax(-1) > touch)[:, bodies].any(-1)
 
 
 def around(centre_w: Tensor, distance: Tensor, generator: torch.Generator) -> Tensor:

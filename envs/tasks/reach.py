@@ -1,5 +1,6 @@
 """Touching a point in the air with the tip of the sword (ASE eq. 17, CALM eq. 11)."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
@@ -12,6 +13,7 @@ from murmillo.envs.markers import Marker
 from murmillo.envs.physics import State
 from murmillo.envs.tasks.arguments import check_choice, check_number, check_range, check_steps
 from murmillo.envs.tasks.goals import GoalTask, into_heading, square, uniform
+from murmillo.envs.tasks.interface import Task
 
 
 @dataclass(frozen=True)
@@ -46,6 +48,10 @@ class Reach(GoalTask):
     goal_dim = 3
     goal_doc = "place of the target from the root, x ahead, y to the left, z up [m] (3), heading frame"
     reward_doc = "exp(-scale d²), d the distance of the sword's tip from the target; scale 5 m⁻², 4 m⁻² with form=code"
+    quantity_docs: ClassVar[Mapping[str, str]] = {
+        **Task.quantity_docs,
+        "distance": "of the sword's tip, or what `key_body` names, from the target [m]",
+    }
 
     def __init__(self, config: ReachConfig | None = None) -> None:
         """Raises SuiteError naming the argument that cannot be."""
@@ -81,8 +87,14 @@ class Reach(GoalTask):
         return into_heading(state, target if self.config.form == "code" else target - state.qpos[:, :3]).float()
 
     def reward(self, state: State) -> dict[str, Tensor]:
-        square_distance = (self.goals["target_w"] - state.key_pos_w[:, self._tip]).square().sum(-1)
-        return {"position": torch.exp(-self._scale * square_distance).float()}
+        return {"position": torch.exp(-self._scale * self._to_target(state).square().sum(-1)).float()}
+
+    def quantities(self, state: State) -> dict[str, Tensor]:
+        return super().quantities(state) | {"distance": self._to_target(state).norm(dim=-1)}
 
     def markers(self, state: State, world: int) -> list[Marker]:
         return [Marker(self.goals["target_w"][world].tolist(), size=0.06)]
+
+    def _to_target(self, state: State) -> Tensor:
+        """[N, 3] from what reaches to the target, world axes [m]."""
+        return self.goals["target_w"] - state.key_pos_w[:, self._tip]

@@ -10,11 +10,12 @@ from torch import Tensor
 from murmillo.envs.character import Character
 from murmillo.envs.markers import Marker
 from murmillo.envs.physics import State
-from murmillo.envs.scene import add_box
+from murmillo.envs.scene import add_box, aside
 from murmillo.envs.tasks.arguments import check_number, check_range, check_steps
-from murmillo.envs.tasks.goals import directions, uniform
+from murmillo.envs.tasks.goals import uniform
 from murmillo.envs.tasks.interface import Task
 from murmillo.envs.tasks.props import aimed, around, put
+from murmillo.envs.tasks.pushes import Pushes
 
 BOXES = {"small_box": (0.2, 1.6), "large_box": (0.5, 12.5)}
 """Edge [m] and mass [kg] of the boxes."""
@@ -55,6 +56,8 @@ class RecoveryConfig:
 class Recovery(Task):
     """Blows come at random times: a push on the root for half a second, or a box from four to five metres away.
 
+    A box lies where it has fallen until it is thrown again or the episode ends.
+
     A fall ends the episode as everywhere; an environment with `fall={"height": 0.0, "heights": {}}` lets it go on, so
     that getting up again can be learned and measured.
     """
@@ -74,26 +77,30 @@ class Recovery(Task):
         self._head = character.bodies.index("head")
         self._torso = character.bodies.index("torso")
         self._steps_left = torch.zeros(num_envs, dtype=torch.int64)
-        self._push_left = torch.zeros(num_envs, dtype=torch.int64)
-        self._force_w = torch.zeros(num_envs, 3, dtype=torch.float64)
+        self._pushes = Pushes(num_envs)
+        self._waiting = torch.ones(num_envs, len(BOXES), dtype=torch.bool)
+        self._aside_w = torch.tensor([aside(box) for box in range(len(BOXES))], dtype=torch.float64)
 
     def reset(self, env_ids: Tensor, state: State, generator: torch.Generator) -> None:
-        self._push_left[env_ids] = 0
+        self._pushes.stop(env_ids)
+        self._waiting[env_ids] = True
+        self._hold(state)
         self._wait(env_ids, generator)
 
     def advance(self, state: State, generator: torch.Generator) -> None:
+        self._hold(state)
         self._steps_left -= 1
-        self._push_left = (self._push_left - 1).clamp_min(0)
+        self._pushes.pass_step()
         due = (self._steps_left <= 0).nonzero().squeeze(-1)
         if not len(due):
             return
         thrown = torch.rand(len(due), generator=generator) < self.config.boxes
-        self._begin_push(due[~thrown], generator)
+        self._pushes.begin(due[~thrown], self.config.force, self.config.push_steps, generator)
         self._throw(due[thrown], state, generator)
         self._wait(due, generator)
 
     def push(self, state: State) -> Tensor | None:
-        return torch.where(self._push_left.unsqueeze(-1) > 0, self._force_w, 0.0)
+        return self._pushes.force_w
 
     def reward(self, state: State) -> dict[str, Tensor]:
         config = self.config
@@ -101,27 +108,28 @@ class Recovery(Task):
         return {"standing": stands.float()}
 
     def markers(self, state: State, world: int) -> list[Marker]:
-        if self._push_left[world] == 0:
+        if self._pushes.left[world] == 0:
             return []
-        force = self._force_w[world]
+        force = self._pushes.force_w[world]
         size = float(force.norm()) / 1000.0
         return [Marker(state.qpos[world, :3].tolist(), force.tolist(), size)]
 
     def state_dict(self) -> dict[str, Any]:
-        return {name: getattr(self, f"_{name}").clone() for name in ("steps_left", "push_left", "force_w")}
+        own = {"steps_left": self._steps_left.clone(), "waiting": self._waiting.clone()}
+        return {**own, **self._pushes.state_dict()}
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
-        for name, value in state.items():
-            getattr(self, f"_{name}").copy_(value)
+        self._steps_left, self._waiting = state["steps_left"].clone(), state["waiting"].clone()
+        self._pushes.load_state_dict(state)
+
+    def _hold(self, state: State) -> None:
+        """Boxes that were not thrown yet hang in the air: lying on the ground they would cost as much as in play."""
+        env_ids, box = self._waiting.nonzero(as_tuple=True)
+        put(state, env_ids, box, self._aside_w[box])
 
     def _wait(self, env_ids: Tensor, generator: torch.Generator) -> None:
         low, high = self.config.every
         self._steps_left[env_ids] = torch.randint(low, high + 1, (len(env_ids),), generator=generator)
-
-    def _begin_push(self, env_ids: Tensor, generator: torch.Generator) -> None:
-        size = uniform(len(env_ids), self.config.force, generator).unsqueeze(-1)
-        self._force_w[env_ids, :2] = size * directions(len(env_ids), generator)
-        self._push_left[env_ids] = self.config.push_steps
 
     def _throw(self, env_ids: Tensor, state: State, generator: torch.Generator) -> None:
         """One of the boxes, at the torso and from its height."""
@@ -130,4 +138,5 @@ class Recovery(Task):
         start_w = target_w.clone()
         start_w[:, :2] = around(target_w, uniform(len(env_ids), self.config.distance, generator), generator)
         put(state, env_ids, box, start_w)
+        self._waiting[env_ids, box] = False
         state.prop_qvel[env_ids, box, :3] = aimed(start_w, target_w, self.config.speed, generator)

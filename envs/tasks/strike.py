@@ -1,7 +1,8 @@
 """Strike: walk to a standing block and knock it over with the sword (ASE, section 7.2; CALM, section 6.2)."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 import mujoco
 import torch
@@ -13,7 +14,7 @@ from murmillo.envs.physics import State
 from murmillo.envs.rotations import quat_rotate
 from murmillo.envs.scene import add_box
 from murmillo.envs.tasks.arguments import check_choice, check_number, check_range
-from murmillo.envs.tasks.goals import uniform
+from murmillo.envs.tasks.goals import TARGET_DOCS, towards_target, uniform
 from murmillo.envs.tasks.interface import Task
 from murmillo.envs.tasks.props import around, felt, put, seen
 
@@ -30,6 +31,7 @@ class StrikeConfig:
         near: share of the targets that stand near.
         near_distance, far_distance: ranges of their distances from the root [m].
         touch: least force that is a touch, along any axis [N].
+        any_body: other bodies than the sword may touch the target too, so that a kick is no failure.
         form: "paper" rewards the target's tilt alone, and only the sword may touch it; "code", as released, rewards the
             approach too, counts a target tilted by more than 78 degrees as full, and lets the arm of the sword touch.
     """
@@ -38,6 +40,7 @@ class StrikeConfig:
     near_distance: tuple[float, float] = (0.5, 1.5)
     far_distance: tuple[float, float] = (0.5, 10.0)
     touch: float = 1.0
+    any_body: bool = False
     form: Literal["paper", "code"] = "paper"
 
     def __post_init__(self) -> None:
@@ -59,6 +62,13 @@ class Strike(Task):
     )
     reward_doc = "1 - u_target . up; code: 0.6 max(0, 1 - u . up) + 0.4 exp(-4 max(0, 1 - v_d)^2), 1 once u . up < 0.2"
     end_doc = "fall, clock, a touch of the target by a body that is neither the sword nor a foot"
+    quantity_docs: ClassVar[Mapping[str, str]] = {
+        **Task.quantity_docs,
+        **TARGET_DOCS,
+        "target_tilt": "angle between the target's own up and the world's [rad]",
+        "target_speed": "of the target's centre [m/s]",
+    }
+    place_docs: ClassVar[Mapping[str, str]] = {"target": "below the target's centre"}
 
     def __init__(self, config: StrikeConfig | None = None) -> None:
         self.config = config or StrikeConfig()
@@ -69,7 +79,7 @@ class Strike(Task):
     def bind(self, num_envs: int, character: Character) -> None:
         super().bind(num_envs, character)
         arm = ("right_hand", "right_lower_arm") if self.config.form == "code" else ()
-        may = ("sword", *arm, *character.feet)
+        may = character.bodies if self.config.any_body else ("sword", *arm, *character.feet)
         self._forbidden = character.body_ids(tuple(body for body in character.bodies if body not in may))
 
     def reset(self, env_ids: Tensor, state: State, generator: torch.Generator) -> None:
@@ -99,6 +109,17 @@ class Strike(Task):
 
     def terminated(self, state: State) -> Tensor:
         return felt(state, 0, self._forbidden, self.config.touch)
+
+    def quantities(self, state: State) -> dict[str, Tensor]:
+        return {
+            **super().quantities(state),
+            **towards_target(state, state.prop_qpos[:, 0, :2]),
+            "target_tilt": self._upright(state).clamp(-1.0, 1.0).acos(),
+            "target_speed": state.prop_qvel[:, 0, :3].norm(dim=-1),
+        }
+
+    def places(self, state: State) -> dict[str, Tensor]:
+        return {"target": state.prop_qpos[:, 0, :2].clone()}
 
     def markers(self, state: State, world: int) -> list[Marker]:
         x, y, _ = state.prop_qpos[world, 0, :3].tolist()

@@ -120,6 +120,13 @@ def test_clips_too_short_are_named() -> None:
         train_classifier([torch.zeros(9, 2), torch.zeros(9, 2)], torch.Generator(), config=QUICK)
 
 
+def test_controllability_by_hand() -> None:
+    """The likeliest class counts, however sure the classifier is of it."""
+    probability = torch.tensor([[0.4, 0.3, 0.3], [0.0, 0.0, 1.0], [0.3, 0.5, 0.2], [0.1, 0.8, 0.1]])
+    assert controllability(probability, torch.tensor([0, 2, 0, 1])) == 0.75
+    assert controllability(probability, torch.tensor([1, 0, 2, 0])) == 0.0
+
+
 def test_inception_score_by_hand() -> None:
     probability = torch.tensor([[0.75, 0.25], [0.25, 0.75]])
     divergence = 0.75 * math.log(0.75 / 0.5) + 0.25 * math.log(0.25 / 0.5)

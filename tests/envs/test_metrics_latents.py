@@ -44,3 +44,9 @@ def test_class_distances_by_hand() -> None:
     distance = class_distances(latent, torch.tensor([9, 4, 9, 4]))
     across = (5 + 10 + 13**0.5 + 72**0.5) / 4  # from (0, 0) and (0, 2) to (3, 4) and (6, 8)
     torch.testing.assert_close(distance, torch.tensor([[2.5, across], [across, 1.0]]).double(), atol=1e-6, rtol=0.0)
+
+
+def test_classes_of_one_point_lie_as_far_apart_as_these_points() -> None:
+    points, kind = torch.tensor([[0.0, 0.0], [3.0, 4.0]]), torch.tensor([0, 1, 1, 0, 1])
+    expected = torch.tensor([[0.0, 5.0], [5.0, 0.0]]).double()
+    torch.testing.assert_close(class_distances(points[kind], kind), expected, atol=1e-6, rtol=0.0)

@@ -18,7 +18,8 @@ def test_a_foot_slides_only_while_it_stands() -> None:
     assert foot_slide(foot, touching) == pytest.approx((0.9 + 0.0 + 0.0 + 1.2) / 4)
 
 
-def test_feet_that_never_stand_do_not_slide() -> None:
+def test_feet_that_never_stand_do_not_slide_and_those_that_stay_have_a_slide_of_0() -> None:
+    assert foot_slide(torch.ones(5, 2, 3), torch.ones(5, 2, dtype=torch.bool)) == 0.0
     assert math.isnan(foot_slide(torch.zeros(5, 2, 3), torch.zeros(5, 2, dtype=torch.bool)))
 
 
@@ -42,6 +43,7 @@ def test_slide_and_jerk_are_the_same_from_anywhere() -> None:
 def test_braking_turns_over_energy_too() -> None:
     torque, velocity = torch.tensor([[10.0, -4.0], [1.0, 1.0]]), torch.tensor([[2.0, 1.0], [0.0, -6.0]])
     assert power(torque, velocity) == pytest.approx(((20 + 4) + (0 + 6)) / 2)
+    assert power(torque, torch.zeros_like(velocity)) == 0.0
 
 
 def test_residual_share_by_hand() -> None:

@@ -30,6 +30,17 @@ def test_return_between_its_bounds() -> None:
         normalised_return(reward, low=0.0, high=1.0)
 
 
+def test_the_bounds_of_the_reward_are_0_and_1() -> None:
+    for reward, expected in ((-0.3, 0.0), (0.9, 1.0)):
+        found = normalised_return(torch.full((4, 7), reward), low=-0.3, high=0.9)
+        assert (found.mean, found.deviation) == (pytest.approx(expected, abs=1e-6), pytest.approx(0.0, abs=1e-6))
+
+
+def test_a_target_that_is_reached_is_no_error() -> None:
+    found = reach_error(torch.ones(3, 5, 3), torch.ones(3, 5, 3))
+    assert (found.mean, found.deviation, found.count) == (0.0, 0.0, 15)
+
+
 def test_reach_error_by_hand() -> None:
     found = reach_error(
         torch.tensor([[0.3, 0.4, 1.0], [1.0, 1.0, 1.0]]), torch.tensor([[0.0, 0.0, 1.0], [1.0, 1.0, 2.0]])

@@ -9,8 +9,8 @@ import torch
 
 from murmillo.envs.character import Character, load_character
 from murmillo.envs.errors import SuiteError
-from murmillo.envs.physics import make_physics
-from murmillo.envs.scene import Scene, add_box
+from murmillo.envs.physics import Physics, make_physics
+from murmillo.envs.scene import Scene, add_box, aside
 
 CUBE = partial(add_box, name="cube", size=(0.2, 0.2, 0.2), mass=0.8)
 
@@ -63,6 +63,59 @@ def test_a_hit_within_a_step_is_felt_at_its_end(character):
     assert felt.all()
 
 
+@pytest.fixture
+def thrown(character):
+    """Makes physics with a cube on its way to the torso of each of 16 worlds, from 0.4 to 1.6 m away."""
+
+    def make(threads: int = 1) -> Physics:
+        physics = make_physics(Scene(character, partial(CUBE, margin=0.1)), 16, threads=threads)
+        physics.write(torch.arange(16), character.default_qpos.expand(16, -1), torch.zeros(16, character.model.nv))
+        torso = physics.state.body_pos_w[:, character.bodies.index("torso")]
+        physics.state.prop_qpos[:, 0, :3] = torso + torch.tensor([0.0, 0.0, 0.1])
+        physics.state.prop_qpos[:, 0, 0] -= torch.linspace(0.4, 1.6, 16, dtype=torch.float64)
+        physics.state.prop_qvel[:, 0, 0] = 35.0
+        return physics
+
+    return make
+
+
+def test_what_is_felt_is_the_greatest_force_of_the_substeps(character, thrown):
+    physics = thrown()
+    model = Scene(character, partial(CUBE, margin=0.1)).model
+    sensors = slice(character.contact_slice.stop, model.nsensordata)
+    ctrl = character.targets(torch.zeros(16, 31, dtype=torch.float64))
+    data = mujoco.MjData(model)
+    before = physics.state_dict()
+    physics.step(ctrl)
+    for world in range(16):
+        data.qpos, data.qvel, data.ctrl = before["qpos"][world], before["qvel"][world], ctrl[world]
+        data.qacc_warmstart = before["qacc_warmstart"][world]
+        greatest = np.zeros(3 * len(character.bodies))
+        for _ in range(character.substeps):
+            mujoco.mj_step(model, data)
+            force = data.sensordata[sensors]
+            greatest = np.where(np.abs(force) > np.abs(greatest), force, greatest)
+        np.testing.assert_array_equal(physics.state.hit_force_w[world].flatten(), greatest)
+    assert physics.state.hit_force_w.flatten(1).any(-1).sum() > 4
+
+
+def test_hits_are_alike_at_any_number_of_threads_and_after_loading(character, thrown):
+    one, other, late = thrown(1), thrown(3), thrown(1)
+    ctrl = character.targets(torch.zeros(16, 31, dtype=torch.float64))
+    begin = one.state_dict()
+    for _ in range(5):
+        late.step(ctrl)
+    late.load_state_dict(begin)
+    for _ in range(2):
+        for physics in (one, other, late):
+            physics.step(ctrl)
+        assert one.state.hit_force_w.any()
+        for physics in (other, late):
+            assert torch.equal(one.state.hit_force_w, physics.state.hit_force_w)
+            assert torch.equal(one.state.prop_qpos, physics.state.prop_qpos)
+            assert torch.equal(one.state.qpos, physics.state.qpos)
+
+
 def test_props_are_kept_with_the_state_and_go_back_with_a_write(character):
     one, other = (make_physics(Scene(character, CUBE), 1) for _ in range(2))
     ctrl = character.targets(torch.zeros(1, 31, dtype=torch.float64))
@@ -74,7 +127,7 @@ def test_props_are_kept_with_the_state_and_go_back_with_a_write(character):
     assert torch.equal(one.state.prop_qpos, other.state.prop_qpos)
     assert one.state.prop_qpos[0, 0, 0] > 50.05
     one.write(torch.tensor([0]), character.default_qpos[None], torch.zeros(1, character.model.nv))
-    assert one.state.prop_qpos[0, 0, :3].tolist() == [50.0, 0.0, 0.1]
+    assert one.state.prop_qpos[0, 0, :3].tolist() == list(aside(0))
 
 
 def test_what_is_no_prop_is_refused(character):
@@ -112,3 +165,12 @@ def test_pictures_show_props_and_markers(character):
     assert (arrow != empty).any()
     assert (ball != arrow).any()
     renderer.close()
+
+
+def test_a_box_with_a_margin_lies_on_the_ground(character):
+    scene = Scene(character, lambda spec: add_box(spec, "cube", (0.2, 0.2, 0.2), 0.8, margin=0.1))
+    data = mujoco.MjData(scene.model)
+    data.qpos[-7:] = [2.0, 0.0, 0.5, 1.0, 0.0, 0.0, 0.0]
+    for _ in range(240):
+        mujoco.mj_step(scene.model, data)
+    assert data.qpos[-5] == pytest.approx(0.1, abs=0.002)

@@ -26,12 +26,12 @@ def test_a_reference_start_is_the_clips_pose_and_velocity_and_not_in_the_floor(
     deep._qpos[:, 2] -= 0.02  # every clip stands in the floor
     sample, moments = deep.sample, []
     deep.sample = lambda *args: moments.append(sample(*args)) or moments[-1]  # type: ignore[method-assign]
-    starts = StartSampler(character, deep, StartConfig(), 50, window=4).draw(
+    starts = StartSampler(character, deep, StartConfig(), 50, frames=4).draw(
         torch.zeros(50, dtype=torch.bool), generator, REFERENCE
     )
     [(clip, time)] = moments
     qpos, qvel = deep.pose(clip, time)
-    assert torch.equal(starts.window, deep.window(clip, time, 4))
+    assert torch.equal(starts.frames, deep.frames(clip, time, 4))
     columns = [i for i in range(qpos.shape[1]) if i != 2]
     torch.testing.assert_close(starts.qpos[:, columns], qpos[:, columns].double())
     torch.testing.assert_close(starts.qvel, qvel.double())
@@ -42,7 +42,7 @@ def test_a_reference_start_is_the_clips_pose_and_velocity_and_not_in_the_floor(
 def test_only_who_fell_goes_on_from_there(
     character: Character, library: MotionLibrary, generator: torch.Generator
 ) -> None:
-    sampler = StartSampler(character, library, StartConfig(recovery=1.0, fallen=0.0, reference=0.0), 1, window=1)
+    sampler = StartSampler(character, library, StartConfig(recovery=1.0, fallen=0.0, reference=0.0), 1, frames=1)
     fell = torch.arange(20) % 2 == 0
     starts = sampler.draw(fell, generator)
     assert torch.equal(starts.kind, torch.where(fell, RECOVERY, DEFAULT))

@@ -207,6 +207,22 @@ def test_recovery_throws_both_boxes_at_the_torso() -> None:
     assert felt.float().mean() > 0.9
 
 
+def test_recovery_begins_with_both_boxes_in_the_air_and_keeps_them_there_until_they_fly() -> None:
+    env = make("Recovery", 8, boxes=1.0, every=(4, 4))
+    begin = env.state.prop_qpos.clone()
+    for _ in range(3):
+        env.step(rest(env))
+        assert torch.equal(env.state.prop_qpos, begin)
+    env.step(rest(env))
+    thrown = (env.state.prop_qpos != begin).any(-1)
+    assert (thrown.sum(-1) == 1).all()
+    env.step(rest(env))
+    assert torch.equal(env.state.prop_qpos[~thrown], begin[~thrown])
+    env.reset(options={"reset_mask": torch.arange(8) < 4, "start": "default"})
+    assert torch.equal(env.state.prop_qpos[:4], begin[:4])
+    assert (env.state.prop_qpos[4:] != begin[4:])[thrown[4:]].any(-1).all()
+
+
 def test_recovery_pays_for_root_and_head_up() -> None:
     env = make("Recovery", 2)
     assert env.task.reward(env.state)["standing"].tolist() == [1.0, 1.0]

@@ -12,7 +12,7 @@ def random() -> torch.Generator:
 
 def test_windows_end_at_any_time_and_motions_at_frames(make_clip, character) -> None:
     library = MotionLibrary([make_clip("one", frames=40, seed=1), make_clip("two", frames=90, seed=2)], character)
-    demonstrations = Demonstrations(library, 5, character.action_dim)
+    demonstrations = Demonstrations(library, character, 5, character.action_dim)
     drawn = demonstrations(64, random())
     clip, time = library.sample(64, random())
     assert torch.equal(drawn["window"], library.window(clip, time, 5))
@@ -26,7 +26,7 @@ def test_windows_end_at_any_time_and_motions_at_frames(make_clip, character) -> 
 
 def test_pairs_are_states_and_the_actions_that_target_the_next_pose(make_clip, character) -> None:
     library = MotionLibrary([make_clip("one", frames=40, seed=1)], character)
-    pairs = Demonstrations(library, 1, character.action_dim + 45).imitation_pairs(32, random())
+    pairs = Demonstrations(library, character, 1, character.action_dim + 45).imitation_pairs(32, random())
     clip, time = library.sample(32, random())
     assert torch.equal(pairs["state"], library.window(clip, time, 1)[:, 0])
     after, _ = library.pose(clip, time + 1 / 30)

@@ -311,3 +311,17 @@ def test_paths_without_clips(tmp_path, character):
 def test_a_manifest_from_before_clips_could_be_masked_is_read(pack, character):
     edit_manifest(pack, lambda m: [clip.pop("masked") for clip in m["clips"]])
     assert [clip.masked for clip in load_clips(pack, character)] == [(), ()]
+
+
+def test_clips_are_chosen_by_name_and_pattern(pack, character):
+    every = [clip.name for clip in load_clips(pack, character)]
+    assert [clip.name for clip in load_clips(pack, character, (every[-1], every[0]))] == [every[0], every[-1]]
+    assert [clip.name for clip in load_clips(pack, character, ("*",))] == every
+
+
+def test_a_name_that_no_clip_has_is_refused_with_the_nearest(pack, character):
+    first = load_clips(pack, character)[0].name
+    with pytest.raises(MotionError, match=f"clips={first}x: .* did you mean {first}"):
+        load_clips(pack, character, (f"{first}x",))
+    with pytest.raises(MotionError, match=r"clips=§: .* there are: "):
+        load_clips(pack, character, (first, "§"))

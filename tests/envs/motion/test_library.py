@@ -184,7 +184,7 @@ def test_windows_on_frames_are_those_of_the_poses(make_clip, character):
     assert (time >= 0.2 - 1e-9).all()
     assert len(time.unique()) > 20
     known = library.window(clip, time, 9)
-    assert library._features is not None
+    assert library._frames is not None
     back = torch.arange(8, -1, -1, dtype=torch.float64) / 30
     poses = library.pose(clip.repeat_interleave(9), (time[:, None] - back).flatten())
     reckoned = character_state(character, *poses, character.key_positions(poses[0])).unflatten(0, (200, 9))
@@ -194,4 +194,4 @@ def test_windows_on_frames_are_those_of_the_poses(make_clip, character):
 def test_clips_of_odd_rates_have_no_windows_at_hand(library):
     clip, time = library.sample(20, random(), on_frames=True)
     library.window(clip, time, 3)
-    assert library._features is None
+    assert library._frames is None
