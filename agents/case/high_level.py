@@ -100,9 +100,8 @@ class HybridPolicy(GaussianPolicy):
         with torch.no_grad():
             self.label_head.weight *= config.mean_init_scale
 
-    def forward(self, state: Tensor, condition: Tensor | None = None) -> Tensor:
+    def read(self, features: Tensor) -> Tensor:
         """Logits of the labels and the latent's mean `[..., K + Z]`."""
-        features = self.features(state, condition)
         return torch.cat([self.label_head(features), self.head(features)], -1)
 
     def sample(self, parameters: Tensor, generator: torch.Generator) -> Tensor:

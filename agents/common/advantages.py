@@ -1,5 +1,7 @@
 """Generalised advantage estimation (Schulman et al. 2015) that keeps an end and a time limit apart."""
 
+from collections.abc import Sequence
+
 import torch
 from torch import Tensor
 
@@ -7,7 +9,7 @@ from torch import Tensor
 def gae(
     reward: Tensor, value: Tensor, next_value: Tensor, terminated: Tensor, done: Tensor, gamma: float, lam: float
 ) -> Tensor:
-    """Advantages `[T, N]`; add `value` for the TD(lambda) targets.
+    """Advantages `[T, N]`, or `[T, N, C]` of C objectives at once; add `value` for the TD(lambda) targets.
 
         delta_t = r_t + gamma (1 - terminated_t) V(s'_t) - V(s_t)
         A_t     = delta_t + gamma lam (1 - done_t) A_{t+1}
@@ -15,14 +17,16 @@ def gae(
     A termination has no future. A truncation has one, `next_value` of the true last observation. Both cut the trace.
 
     Args:
-        reward: `[T, N]`.
-        value: V(s_t) `[T, N]`.
-        next_value: V of the true successor `[T, N]`.
+        reward: `[T, N]` or `[T, N, C]`.
+        value: V(s_t), shaped like the reward.
+        next_value: V of the true successor, shaped like the reward.
         terminated: bool `[T, N]`, the episode ended in failure or success.
         done: bool `[T, N]`, terminated or truncated.
         gamma: discount.
         lam: trace decay.
     """
+    if reward.dim() > terminated.dim():
+        terminated, done = terminated[..., None], done[..., None]
     delta = reward + gamma * next_value * ~terminated - value
     decay = gamma * lam * (~done).to(reward.dtype)
     advantage = torch.empty_like(delta)
@@ -37,3 +41,12 @@ def normalise_advantage(advantage: Tensor, eps: float = 1e-5) -> Tensor:
     """Mean 0 and standard deviation 1 over the whole rollout, any shape."""
     std, mean = torch.std_mean(advantage, correction=0)
     return (advantage - mean) / (std + eps)
+
+
+def weigh_advantages(advantage: Tensor, weights: Sequence[float]) -> Tensor:
+    """What the policy follows, `[T, N]`: the sum of weight times normalised advantage over objectives `[T, N, C]`.
+
+    Each objective is normalised by itself, so that none drowns the others by its scale (AdaptNet, eq. 9).
+    """
+    normalised = [normalise_advantage(objective) for objective in advantage.unbind(-1)]
+    return torch.stack([weight * one for weight, one in zip(weights, normalised, strict=True)]).sum(0)

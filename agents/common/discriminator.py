@@ -90,6 +90,7 @@ class Discriminator(nn.Module):
         config: DiscriminatorConfig,
         generator: torch.Generator,
         condition: Condition | None = None,
+        trunk: nn.Sequential | None = None,
     ) -> None:
         """
         Args:
@@ -98,6 +99,7 @@ class Discriminator(nn.Module):
             config: sizes and weights.
             generator: draws the initial weights.
             condition: what it is told beside the window.
+            trunk: from its inputs `[B, W D + ...]` to features `[B, H]`; fully connected layers unless given.
         """
         super().__init__()
         self.config = config
@@ -106,7 +108,7 @@ class Discriminator(nn.Module):
         # feature cannot be told from its place in it
         self.normalizer = RunningNormalizer((state_dim,))
         sizes = [frames * state_dim + self.condition.inputs, *config.hidden]
-        self.trunk = mlp(sizes, generator, config.dropout)
+        self.trunk = trunk or mlp(sizes, generator, config.dropout)
         self.dropout = Dropout(config.dropout, generator)
         self.head = linear(config.hidden[-1], self.condition.outputs, generator, bound=1.0)
         self.eval()
@@ -205,8 +207,13 @@ def discriminator_loss(
 
 def gradient_penalty(logits: Tensor, x: Tensor) -> Tensor:
     """E ||d logit / dx||^2 of logits `[B]` at the inputs `[B, ...]` that they came from, ready to be differentiated."""
+    return input_gradient(logits, x).square().sum(-1).mean()
+
+
+def input_gradient(logits: Tensor, x: Tensor) -> Tensor:
+    """d logit / dx, flat `[B, ...]`, of logits `[B]`, or of the sum of logits `[B, H]`, ready to be differentiated."""
     (gradient,) = torch.autograd.grad(logits.sum(), x, create_graph=True)
-    return gradient.flatten(1).square().sum(-1).mean()
+    return gradient.flatten(1)
 
 
 def style_reward(logits: Tensor, scale: float = 1.0) -> Tensor:

@@ -38,7 +38,7 @@ class Agent(Protocol):
         ...
 
     def value(self, obs: Obs, extras: dict[str, Tensor]) -> Tensor:
-        """Expected return `[...]` of observations `[..., D]`, in the reward's own units."""
+        """Expected return `[...]` of observations `[..., D]`, in the reward's own units; `[..., C]` of C objectives."""
         ...
 
     def reset(self, env_ids: Tensor) -> None:
@@ -50,7 +50,7 @@ class Agent(Protocol):
         ...
 
     def update(self, rollout: Rollout) -> dict[str, float]:
-        """Learn from a rollout with "advantage" and "return"; the means of losses and scores, by name."""
+        """Learn from a rollout with "advantage" (normalised) and "return"; the means of losses and scores, by name."""
         ...
 
     def state_dict(self) -> dict[str, Any]:
@@ -67,6 +67,17 @@ class Directing(Protocol):
     def directions(self) -> dict[str, Any]:
         """Settings of the environment by name, each for its method `set_<name>`, told before every iteration."""
         ...
+
+
+@runtime_checkable
+class MultiObjective(Protocol):
+    """An agent with a critic for each of several reward terms (Xu et al. 2023), whose `value` is `[..., C]`.
+
+    The runner's weights are then not those of rewards in a sum but of the objectives' normalised advantages.
+    """
+
+    objectives: tuple[str, ...]
+    """The C reward terms, in the order of the critics."""
 
 
 @runtime_checkable

@@ -1,7 +1,8 @@
-"""The networks that every agent builds from: fully connected layers and a Gaussian policy."""
+"""The networks that every agent builds from: fully connected layers, a Gaussian policy and its critic."""
 
+import copy
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import pairwise
 
 import torch
@@ -40,12 +41,17 @@ class Dropout(nn.Module):
         return x * kept / (1 - self.rate)
 
 
-def mlp(sizes: Sequence[int], generator: torch.Generator, dropout: float = 0.0) -> nn.Sequential:
+def mlp(
+    sizes: Sequence[int],
+    generator: torch.Generator,
+    dropout: float = 0.0,
+    activation: Callable[[], nn.Module] = nn.ReLU,
+) -> nn.Sequential:
     """Layers of the given sizes, the input's first, with a ReLU after every one and dropout, if any, before it."""
     layers: list[nn.Module] = []
     for inputs, outputs in pairwise(sizes):
         layers += [Dropout(dropout, generator)] if dropout else []
-        layers += [linear(inputs, outputs, generator), nn.ReLU()]
+        layers += [linear(inputs, outputs, generator), activation()]
     return nn.Sequential(*layers)
 
 
@@ -55,14 +61,73 @@ def style_mlp(latent_dim: int, hidden: Sequence[int], generator: torch.Generator
     return nn.Sequential(mlp(sizes, generator), linear(sizes[-1], latent_dim, generator, bound=1.0), nn.Tanh())
 
 
-class GaussianPolicy(nn.Module):
-    """pi(a | s, c) = N(mu(s, c), diag std^2) with a fixed std (ASE, section 8.2).
+Told = Tensor | Mapping[str, Tensor] | None
+"""What policy and critic are told beside the state: a condition `[..., C]`, several things by name, or nothing."""
 
-    PPO knows a policy by its parameters, here the mean: `forward` gives them, the other methods are told them. A policy
-    of another kind of action overrides both.
+
+class Policy(nn.Module):
+    """A distribution over actions, in three parts that an adapter can get between: a latent, layers, a reading.
+
+    PPO knows a policy by the parameters of its distribution: `forward` gives them, the other methods are told them.
+    Here it is a Gaussian, of whose parameters `moments` makes mean and standard deviation; a policy of another kind of
+    action overrides what it does with them.
     """
 
+    trunk: nn.Sequential
+    """Fully connected layers and what follows each, from Z^0 to the last hidden layer."""
+    head: nn.Linear
+    """From the last hidden layer to the mean."""
     log_std: Tensor
+    """`[A]`, where it depends on no state."""
+
+    def forward(self, state: Tensor, told: Told = None) -> Tensor:
+        """Parameters `[..., P]` of the actions in normalised states `[..., D]`, under what the policy is told."""
+        return self.read(self.features(state, told))
+
+    def features(self, state: Tensor, told: Told = None) -> Tensor:
+        """The last hidden layer `[..., H]`."""
+        return self.trunk(self.encode(state, told))
+
+    def encode(self, state: Tensor, told: Told = None) -> Tensor:
+        """Z^0 `[..., Z]`, what the first fully connected layer sees."""
+        raise NotImplementedError
+
+    def read(self, features: Tensor) -> Tensor:
+        """Parameters `[..., P]` from the last hidden layer `[..., H]`."""
+        return self.head(features)
+
+    def copy_encoder(self) -> nn.Module:
+        """A module that does as `encode` does now, with weights of its own."""
+        raise NotImplementedError
+
+    def moments(self, parameters: Tensor) -> tuple[Tensor, Tensor]:
+        """Mean `[..., A]` and logarithm of the standard deviation, `[..., A]` or `[A]`."""
+        return parameters, self.log_std
+
+    def sample(self, parameters: Tensor, generator: torch.Generator) -> Tensor:
+        """Actions `[..., A]` drawn from the distributions with these parameters."""
+        mean, log_std = self.moments(parameters)
+        return mean + log_std.exp() * torch.randn(mean.shape, generator=generator)
+
+    def mode(self, parameters: Tensor) -> Tensor:
+        """The likeliest actions `[..., A]`."""
+        return self.moments(parameters)[0]
+
+    def log_prob(self, action: Tensor, parameters: Tensor) -> Tensor:
+        """Log probabilities `[...]` of actions `[..., A]`."""
+        return gaussian_log_prob(action, *self.moments(parameters))
+
+    def entropy(self, parameters: Tensor) -> Tensor:
+        """[nat], `[...]`, or one for all where it depends on no state."""
+        return gaussian_entropy(self.moments(parameters)[1])
+
+    def bound_loss(self, parameters: Tensor) -> Tensor:
+        """What keeps the means of parameters `[B, ...]` within [-1, 1]."""
+        return action_bound_loss(self.moments(parameters)[0])
+
+
+class GaussianPolicy(Policy):
+    """pi(a | s, c) = N(mu(s, c), diag std^2) with a fixed std (ASE, section 8.2)."""
 
     def __init__(
         self,
@@ -75,6 +140,7 @@ class GaussianPolicy(nn.Module):
         condition_dim: int = 0,
         style_hidden: Sequence[int] = (),
         mean_init_scale: float = 1.0,
+        activation: Callable[[], nn.Module] = nn.ReLU,
     ) -> None:
         """
         Args:
@@ -86,41 +152,49 @@ class GaussianPolicy(nn.Module):
             condition_dim: C, size of the latent or label beside the state; 0 for none.
             style_hidden: hidden sizes of the style network in front of the condition; empty for none.
             mean_init_scale: factor on the initial weights of the last layer.
+            activation: after every hidden layer.
         """
         super().__init__()
         if std <= 0:
             raise AgentError(f"ppo.std={std} is no standard deviation; the paper has 0.05")
         self.style = style_mlp(condition_dim, style_hidden, generator) if style_hidden else nn.Identity()
-        self.trunk = mlp([state_dim + condition_dim, *hidden], generator)
+        self.trunk = mlp([state_dim + condition_dim, *hidden], generator, activation=activation)
         self.head = linear(hidden[-1], action_dim, generator)
         with torch.no_grad():
             self.head.weight *= mean_init_scale
         self.register_buffer("log_std", torch.full((action_dim,), std).log())
 
+    def encode(self, state: Tensor, told: Told = None) -> Tensor:
+        """The state, and beside it the condition as the style network shows it."""
+        return styled(state, told, self.style)
+
+    def copy_encoder(self) -> nn.Module:
+        return StyledState(copy.deepcopy(self.style))
+
+
+def styled(state: Tensor, condition: Told, style: nn.Module) -> Tensor:
+    """States `[..., D]` and beside each its condition `[..., C]`, if any, as the style network shows it."""
+    return state if condition is None else torch.cat([state, style(condition)], -1)
+
+
+class StyledState(nn.Module):
+    """`styled` with a network of its own."""
+
+    def __init__(self, style: nn.Module) -> None:
+        super().__init__()
+        self.style = style
+
+    def forward(self, state: Tensor, told: Told = None) -> Tensor:
+        return styled(state, told, self.style)
+
+
+class Critic(nn.Sequential):
+    """The expected return of a state under a condition, normalised."""
+
+    def __init__(self, state_dim: int, condition_dim: int, hidden: Sequence[int], generator: torch.Generator) -> None:
+        super().__init__(mlp([state_dim + condition_dim, *hidden], generator), linear(hidden[-1], 1, generator))
+
     def forward(self, state: Tensor, condition: Tensor | None = None) -> Tensor:
-        """Mean action `[..., A]` of normalised states `[..., D]` under conditions `[..., C]`."""
-        return self.head(self.features(state, condition))
-
-    def features(self, state: Tensor, condition: Tensor | None = None) -> Tensor:
-        """The last hidden layer `[..., H]`."""
-        return self.trunk(state if condition is None else torch.cat([state, self.style(condition)], -1))
-
-    def sample(self, parameters: Tensor, generator: torch.Generator) -> Tensor:
-        """Actions `[..., A]` drawn from the distributions with these parameters."""
-        return parameters + self.log_std.exp() * torch.randn(parameters.shape, generator=generator)
-
-    def mode(self, parameters: Tensor) -> Tensor:
-        """The likeliest actions `[..., A]`."""
-        return parameters
-
-    def log_prob(self, action: Tensor, parameters: Tensor) -> Tensor:
-        """Log probabilities `[...]` of actions `[..., A]`."""
-        return gaussian_log_prob(action, parameters, self.log_std)
-
-    def entropy(self, parameters: Tensor) -> Tensor:
-        """[nat], `[...]`, or one for all where it depends on no state."""
-        return gaussian_entropy(self.log_std)
-
-    def bound_loss(self, parameters: Tensor) -> Tensor:
-        """What keeps the means of parameters `[B, ...]` within [-1, 1]."""
-        return action_bound_loss(parameters)
+        """`[...]` from normalised states `[..., D]` and conditions `[..., C]`."""
+        inputs = state if condition is None else torch.cat([state, condition], -1)
+        return super().forward(inputs).squeeze(-1)

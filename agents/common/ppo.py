@@ -8,10 +8,9 @@ from typing import Any
 import torch
 from torch import Tensor, nn
 
-from murmillo.agents.common.advantages import normalise_advantage
 from murmillo.agents.common.errors import AgentError
 from murmillo.agents.common.losses import approx_kl, clip_fraction, ppo_policy_loss, value_loss
-from murmillo.agents.common.networks import GaussianPolicy, linear, mlp
+from murmillo.agents.common.networks import Critic, GaussianPolicy, Policy, Told
 from murmillo.agents.common.normalizer import RunningNormalizer
 from murmillo.agents.common.rollout import Rollout
 from murmillo.agents.common.training import Means, adam, adam_state, load_adam_state, load_module, minimise
@@ -35,6 +34,8 @@ class PPOConfig:
         minibatch: samples a step.
         clip: bound on the ratio's distance from 1.
         bound_weight: of the loss on means beyond [-1, 1].
+        value_weight: of the critic's loss; it matters only where the norm of the gradient is bounded.
+        max_grad_norm: bound on the norm of the gradient of policy and critic together; None for none.
         target_kl: end the passes at the first minibatch on which the policy is further than this from the one that
             acted [nat]; None goes on.
     """
@@ -49,13 +50,16 @@ class PPOConfig:
     minibatch: int = 16384
     clip: float = 0.2
     bound_weight: float = 10.0
+    value_weight: float = 1.0
+    max_grad_norm: float | None = None
     target_kl: float | None = None
 
 
 class ActorCritic(nn.Module):
     """Policy and critic on normalised states; the critic predicts normalised returns.
 
-    The condition `[..., C]` reaches the policy through its style network and the critic raw.
+    What they are told beside the state is a condition `[..., C]` that reaches the policy through its style network and
+    the critic raw, or whatever else networks that are given here can be told.
     """
 
     def __init__(
@@ -65,11 +69,15 @@ class ActorCritic(nn.Module):
         condition_dim: int,
         config: PPOConfig,
         generator: torch.Generator,
-        policy: GaussianPolicy | None = None,
+        policy: Policy | None = None,
+        *,
+        critic: nn.Module | None = None,
+        state_normalizer: nn.Module | None = None,
+        return_normalizer: nn.Module | None = None,
     ) -> None:
-        """`policy` takes the place of the Gaussian one that the config describes."""
+        """`policy`, `critic` and normalisers take the place of those that the config describes."""
         super().__init__()
-        self.policy = policy or GaussianPolicy(
+        self.policy: Policy = policy or GaussianPolicy(
             state_dim,
             action_dim,
             config.hidden,
@@ -79,30 +87,32 @@ class ActorCritic(nn.Module):
             style_hidden=config.style_hidden if condition_dim else (),
             mean_init_scale=config.mean_init_scale,
         )
-        self.critic = nn.Sequential(
-            mlp([state_dim + condition_dim, *config.hidden], generator), linear(config.hidden[-1], 1, generator)
-        )
-        self.state_normalizer = RunningNormalizer((state_dim,))
-        self.return_normalizer = RunningNormalizer()
+        self.critic = critic or Critic(state_dim, condition_dim, config.hidden, generator)
+        self.state_normalizer: Any = state_normalizer or RunningNormalizer((state_dim,))
+        self.return_normalizer: Any = return_normalizer or RunningNormalizer()
 
     @torch.no_grad()
     def act(
-        self, state: Tensor, condition: Tensor | None, generator: torch.Generator, deterministic: bool = False
+        self, state: Tensor, told: Told, generator: torch.Generator, deterministic: bool = False
     ) -> tuple[Tensor, Tensor]:
         """Actions `[N, A]` and their log probabilities `[N]` for raw states `[N, D]`."""
-        parameters = self.policy(self.state_normalizer(state), condition)
+        parameters = self.policy(self.state_normalizer(state), told)
         action = self.policy.mode(parameters) if deterministic else self.policy.sample(parameters, generator)
         return action, self.policy.log_prob(action, parameters)
 
     @torch.no_grad()
-    def value(self, state: Tensor, condition: Tensor | None) -> Tensor:
-        """Expected returns `[...]` of raw states `[..., D]`, in the reward's units."""
-        return self.return_normalizer.inverse(self.normalised_value(self.state_normalizer(state), condition))
+    def value(self, state: Tensor, told: Told) -> Tensor:
+        """Expected returns `[...]` of raw states `[..., D]`, in the reward's units; `[..., C]` of C objectives."""
+        return self.return_normalizer.inverse(self.critic(self.state_normalizer(state), told))
 
-    def normalised_value(self, state: Tensor, condition: Tensor | None) -> Tensor:
-        """What the critic itself predicts, `[...]` from normalised states `[..., D]`."""
-        inputs = state if condition is None else torch.cat([state, condition], -1)
-        return self.critic(inputs).squeeze(-1)
+    def targets(self, rollout: Rollout) -> Tensor:
+        """What the critic is to predict of each sample `[T N]`: its normalised return."""
+        return self.return_normalizer(rollout.flat("return"))
+
+    def observe(self, rollout: Rollout) -> None:
+        """Let the normalisers learn from a rollout, once the update that used them is over."""
+        self.state_normalizer.update(rollout["state"])
+        self.return_normalizer.update(rollout["return"])
 
 
 class PPO:
@@ -135,16 +145,17 @@ class PPO:
         generator: torch.Generator,
         *,
         fields: tuple[str, ...] = (),
-        condition: Callable[[Minibatch], Tensor | None] = lambda batch: None,
+        condition: Callable[[Minibatch], Told] = lambda batch: None,
         extra_loss: Callable[[Minibatch, Tensor], Mapping[str, Tensor]] = lambda batch, mean: {},
     ) -> dict[str, float]:
         """One iteration's passes over the rollout, then the normalisers.
 
         Args:
-            rollout: with state, action, log_prob, advantage, return.
+            rollout: with state, action, log_prob, return and the normalised advantage.
             generator: draws the minibatches.
             fields: further fields that the minibatches carry to `condition` and `extra_loss`.
-            condition: what policy and critic are told, `[B, C]`, from a minibatch; gradients flow into it.
+            condition: what policy and critic are told, `[B, ...]`, from a minibatch; gradients flow into it. It may add
+                to the minibatch what `extra_loss` is to see.
             extra_loss: further weighted losses of the policy by name, from a minibatch and the policy's parameters
                 `[B, P]`, a Gaussian's means.
 
@@ -160,10 +171,9 @@ class PPO:
                 f"ppo.minibatch={config.minibatch} is larger than the {rollout.samples} samples of an iteration "
                 f"({rollout.horizon} steps of {rollout.num_envs} worlds)"
             )
-        data = {name: rollout.flat(name) for name in ("action", "log_prob", *fields)}
+        data = {name: rollout.flat(name) for name in ("action", "log_prob", "advantage", *fields)}
         data["state"] = self.model.state_normalizer(rollout.flat("state"))
-        data["advantage"] = normalise_advantage(rollout.flat("advantage"))
-        data["target"] = self.model.return_normalizer(rollout.flat("return"))
+        data["target"] = self.model.targets(rollout)
 
         means = Means()
         passes = [rollout.minibatches(config.minibatch, generator) for _ in range(config.epochs)]
@@ -173,25 +183,24 @@ class PPO:
             means.add({**losses, **scores})
             if config.target_kl is not None and scores["kl"] > config.target_kl:
                 break
-            minimise(self.optimizer, losses)
-        self.model.state_normalizer.update(rollout["state"])
-        self.model.return_normalizer.update(rollout["return"])
+            minimise(self.optimizer, losses, config.max_grad_norm)
+        self.model.observe(rollout)
         return means.result()
 
     def _losses(
         self,
         batch: Minibatch,
-        condition: Tensor | None,
+        told: Told,
         extra_loss: Callable[[Minibatch, Tensor], Mapping[str, Tensor]],
     ) -> tuple[dict[str, Tensor], dict[str, Tensor]]:
         config, policy = self.config, self.model.policy
-        parameters = policy(batch["state"], condition)
+        parameters = policy(batch["state"], told)
         log_prob = policy.log_prob(batch["action"], parameters)
         losses = {
             "policy": ppo_policy_loss(log_prob, batch["log_prob"], batch["advantage"], config.clip),
             "bound": config.bound_weight * policy.bound_loss(parameters),
             **extra_loss(batch, parameters),
-            "value": value_loss(self.model.normalised_value(batch["state"], condition), batch["target"]),
+            "value": config.value_weight * value_loss(self.model.critic(batch["state"], told), batch["target"]),
         }
         with torch.no_grad():
             scores = {

@@ -12,11 +12,11 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from torch import Tensor
 
 from murmillo.agents.common import checkpoint
-from murmillo.agents.common.advantages import gae
+from murmillo.agents.common.advantages import gae, normalise_advantage, weigh_advantages
 from murmillo.agents.common.episodes import EpisodeStatistics
 from murmillo.agents.common.errors import AgentError
 from murmillo.agents.common.failures import WatchConfig
-from murmillo.agents.common.interface import Agent, Directing
+from murmillo.agents.common.interface import Agent, Directing, MultiObjective
 from murmillo.agents.common.logger import Logger
 from murmillo.agents.common.rollout import Rollout, tensors, true_next_obs
 from murmillo.agents.common.watch import Watch
@@ -36,7 +36,9 @@ class RunnerConfig:
         lam: lambda of GAE and of TD(lambda).
         reward_weights: a weight for every reward term that the agent names, and for those of the environment that
             should count: "task", its own reward, and what `infos["side_rewards"]` holds; a weight of 0 may name a term
-            that there is not. 1 and beta = 0.5 are ASE's.
+            that there is not. 1 and beta = 0.5 are ASE's. Of an agent with several objectives they weigh not rewards
+            but advantages.
+        termination_reward: in place of all rewards at a step that terminates (AdaptNet's code: -25); None leaves them.
         checkpoint_minutes: save this often, and at the end.
         max_minutes: end after this much time, counted from `run`; None for no limit.
         watch: when to warn that the training fails.
@@ -49,6 +51,7 @@ class RunnerConfig:
     reward_weights: dict[str, float] = field(default_factory=lambda: {"style": 1.0, "skill": 0.5})
     checkpoint_minutes: float = 10.0
     max_minutes: float | None = None
+    termination_reward: float | None = None
     watch: WatchConfig = field(default_factory=WatchConfig)
 
 
@@ -174,7 +177,7 @@ class Runner:
         return tensors(obs)
 
     def _reward(self, rollout: Rollout) -> dict[str, float]:
-        """Sum the weighted terms into "reward"; the mean of every term and of the sum, by name."""
+        """The terms as "reward", summed by weight or one an objective; the mean of each and of the sum, by name."""
         weights = {**dict.fromkeys(self._env_terms, 0.0), **self.config.reward_weights}
         terms = {**{name: rollout[name] for name in self._env_terms}, **self.agent.rewards(rollout)}
         weights = {name: weight for name, weight in weights.items() if weight or name in terms}
@@ -183,21 +186,42 @@ class Runner:
                 f"reward_weights names {', '.join(sorted(self.config.reward_weights))}, "
                 f"but the terms are {', '.join(sorted(terms))}"
             )
-        rollout["reward"] = torch.stack([weights[name] * term for name, term in terms.items()]).sum(0)
+        total = torch.stack([weights[name] * term for name, term in terms.items()]).sum(0)
+        reward = self._by_objective(terms, weights) if isinstance(self.agent, MultiObjective) else total
+        if self.config.termination_reward is not None:
+            terminated = rollout["terminated"].view(*rollout.shape, *[1] * (reward.dim() - 2))
+            reward = reward.masked_fill(terminated, self.config.termination_reward)
+        rollout["reward"] = reward
         means = {f"reward/{name}": term.mean().item() for name, term in terms.items()}
-        return means | {"reward/total": rollout["reward"].mean().item()}
+        return means | {"reward/total": total.mean().item()}
+
+    def _by_objective(self, terms: Mapping[str, Tensor], weights: Mapping[str, float]) -> Tensor:
+        """The terms that have a critic, `[T, N, C]`."""
+        assert isinstance(self.agent, MultiObjective)
+        stray = [name for name, weight in weights.items() if weight and name not in self.agent.objectives]
+        if stray:
+            raise AgentError(
+                f"reward_weights.{stray[0]}={weights[stray[0]]}: the agent has critics for "
+                f"{', '.join(self.agent.objectives)} only; weigh it with 0"
+            )
+        return torch.stack([terms[name] for name in self.agent.objectives], -1)
 
     def _advantage(self, rollout: Rollout) -> None:
-        """Values in one batch, then "advantage" and "return"."""
+        """Values in one batch, then "advantage", normalised, and "return"."""
         extras = {name: rollout[name] for name in self._extras}
         obs = {name: rollout[name] for name in self.agent.needs if not name.startswith("next_")}
         next_obs = {name[5:]: rollout[name] for name in self.agent.needs if name.startswith("next_")}
         value, next_value = self.agent.value(obs, extras), self.agent.value(next_obs, extras)
         done = rollout["terminated"] | rollout["truncated"]
-        rollout["advantage"] = gae(
+        advantage = gae(
             rollout["reward"], value, next_value, rollout["terminated"], done, self.config.gamma, self.config.lam
         )
-        rollout["return"] = rollout["advantage"] + value
+        rollout["return"] = advantage + value
+        if isinstance(self.agent, MultiObjective):
+            weights = [self.config.reward_weights.get(name, 0.0) for name in self.agent.objectives]
+            rollout["advantage"] = weigh_advantages(advantage, weights)
+        else:
+            rollout["advantage"] = normalise_advantage(advantage)
 
     def _check(self, scalars: Mapping[str, float]) -> None:
         for name, value in scalars.items():

@@ -14,10 +14,14 @@ def adam(*groups: tuple[Iterable[nn.Parameter], float]) -> torch.optim.Adam:
     return torch.optim.Adam([{"params": list(params), "lr": rate} for params, rate in groups], fused=True)
 
 
-def minimise(optimizer: torch.optim.Optimizer, losses: Mapping[str, Tensor]) -> None:
-    """One step down the sum of named losses."""
+def minimise(
+    optimizer: torch.optim.Optimizer, losses: Mapping[str, Tensor], max_grad_norm: float | None = None
+) -> None:
+    """One step down the sum of named losses; the gradient of all parameters together is scaled down to the norm."""
     optimizer.zero_grad()
     torch.stack(list(losses.values())).sum().backward()
+    if max_grad_norm is not None:
+        nn.utils.clip_grad_norm_([p for group in optimizer.param_groups for p in group["params"]], max_grad_norm)
     optimizer.step()
 
 

@@ -14,19 +14,21 @@ import torch
 
 from murmillo.agents.common import checkpoint
 from murmillo.agents.common.errors import AgentError
-from murmillo.agents.common.interface import Agent, Steerable
+from murmillo.agents.common.interface import Agent, MultiObjective, Steerable
 from murmillo.agents.common.rollout import Rollout, tensors, true_next_obs
 from murmillo.agents.common.runner import Runner
 from tests.agents.toy import PointMass, equal, make_ase, make_calm, make_case, make_runner, small_ase
+from tests.agents.toy_adaptnet import make_adaptnet
 from tests.agents.toy_tasks import make_commanded, make_task
 
 Maker = Callable[..., Agent]
 LOW_LEVEL: dict[str, Maker] = {"ase": make_ase, "calm": make_calm, "case": make_case}
-AGENTS: dict[str, Maker] = {**LOW_LEVEL, "task": make_task, "commanded": make_commanded}
+AGENTS: dict[str, Maker] = {**LOW_LEVEL, "adaptnet": make_adaptnet, "task": make_task, "commanded": make_commanded}
 REWARDS = {
     "ase": {"style": 1.0, "skill": 0.5},
     "calm": {"style": 1.0},
     "case": {"style": 1.0, "skill": 0.5},
+    "adaptnet": {"task": 0.5, "imitation": 0.5},
     "task": {"task": 1.0},
     "commanded": {"task": 1.0},
 }
@@ -62,8 +64,13 @@ def collected(agent: Agent, env: PointMass) -> Rollout:
         obs = tensors(next_obs)
     shape = (HORIZON, env.num_envs)
     rollout["advantage"] = torch.randn(shape, generator=torch.Generator().manual_seed(1))
-    rollout["return"] = rollout["advantage"] + 1
+    rollout["return"] = torch.randn(*shape, *critics(agent), generator=torch.Generator().manual_seed(1)) + 1
     return rollout
+
+
+def critics(agent: Agent) -> list[int]:
+    """The dimensions of a value behind those of its state."""
+    return [len(agent.objectives)] if isinstance(agent, MultiObjective) else []
 
 
 def values(agent: Agent, env: PointMass, rollout: Rollout) -> torch.Tensor:
@@ -84,7 +91,7 @@ def test_shapes_and_kinds(make: Maker, skills: int, num_envs: int, generator: to
     assert all(len(value) == num_envs for value in step.extras.values())
     assert not any(value.requires_grad for value in (step.action, step.log_prob, *step.extras.values()))
     value = agent.value(obs, step.extras)
-    assert value.shape == (num_envs,)
+    assert list(value.shape) == [num_envs, *critics(agent)]
     assert not value.requires_grad
     stacked = agent.value(
         {name: torch.stack([value, value]) for name, value in obs.items()},

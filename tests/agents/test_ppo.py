@@ -2,6 +2,7 @@ from typing import Any
 
 import torch
 
+from murmillo.agents.common.advantages import normalise_advantage
 from murmillo.agents.common.losses import action_bound_loss
 from murmillo.agents.common.ppo import PPO, ActorCritic, PPOConfig
 from murmillo.agents.common.rollout import Rollout
@@ -20,7 +21,7 @@ def rollout(ppo: PPO, generator: torch.Generator) -> Rollout:
         state = 7 + torch.randn(10, 3, generator=generator)
         action, log_prob = ppo.model.act(state, None, generator)
         batch.store(t, {"state": state, "action": action, "log_prob": log_prob})
-    batch["advantage"] = batch["action"][..., 0].clone()
+    batch["advantage"] = normalise_advantage(batch["action"][..., 0])
     batch["return"] = 100 + 10 * batch["state"][..., 1]
     return batch
 

@@ -30,9 +30,13 @@ class Heading(PointMass):
     def step(self, actions: np.ndarray) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray, np.ndarray, dict]:
         goal = self.goal.copy()
         obs, speed, terminated, truncated, infos = super().step(actions)
-        along = (infos["final_obs"]["state"][:, 2:] * goal).sum(1).astype(np.float64)
+        along = (self.velocity(infos["final_obs"]) * goal).sum(1).astype(np.float64)
         infos |= {"reward_terms": {"along": along}, "side_rewards": {"speed": speed}}
         return obs, along, terminated, truncated, infos
+
+    def velocity(self, obs: dict[str, np.ndarray]) -> np.ndarray:
+        """`[N, 2]`."""
+        return obs["state"][:, 2:]
 
     def observation(self) -> dict[str, np.ndarray]:
         return self._obs()

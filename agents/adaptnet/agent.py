@@ -1,0 +1,190 @@
+"""AdaptNet: policies of a goal and a style, and their adaptation to what is new (Xu et al. 2023a and b)."""
+
+from typing import Any
+
+import torch
+from gymnasium.vector import VectorEnv
+from torch import Tensor
+
+from murmillo.agents.adaptnet.base import Base
+from murmillo.agents.adaptnet.config import AdaptNetConfig
+from murmillo.agents.adaptnet.ensemble import Ensemble, hinge_loss, imitation_reward
+from murmillo.agents.adaptnet.merge import merge
+from murmillo.agents.adaptnet.model import make_model
+from murmillo.agents.adaptnet.spaces import Observed
+from murmillo.agents.common.adapter import INJECTION, AdaptedPolicy
+from murmillo.agents.common.discriminator import Windows
+from murmillo.agents.common.errors import AgentError
+from murmillo.agents.common.interface import Demonstrations, Obs, Step
+from murmillo.agents.common.masks import FeatureMasks
+from murmillo.agents.common.ppo import PPO, Minibatch
+from murmillo.agents.common.rollout import Rollout
+from murmillo.agents.common.training import Means, adam, load_parts, minimise, named, state_of
+
+
+class AdaptNet:
+    """A policy that reaches a goal in the style of the demonstrations; with a base, an adaptation of that.
+
+    Goal and style have critics of their own, and the policy follows the sum of their normalised advantages (eq. 9). An
+    adaptation has new critics and discriminators and trains only what is new in the policy (eq. 12, Algorithm 1).
+    """
+
+    objectives = ("task", "imitation")
+
+    def __init__(
+        self,
+        env: VectorEnv,
+        demonstrations: Demonstrations,
+        config: AdaptNetConfig,
+        generator: torch.Generator,
+        base: Base | None = None,
+    ) -> None:
+        """
+        Args:
+            env: read for its spaces only: "state" `[F, D]` or `[D]`, "window" `[W, D']`, and as far as there are,
+                "length" of valid states, "goal" `[G]` and "heights" `[35, 35]`.
+            demonstrations: windows of the reference motions.
+            config: hyperparameters.
+            generator: draws weights, noise and minibatches.
+            base: the policy to adapt; None to train one from nothing.
+
+        Raises:
+            AgentError: environment, demonstrations, base and config do not fit together.
+        """
+        self.observed = Observed.of(env, demonstrations, config.window)
+        self.needs = self.observed.needs
+        self.config = config
+        self.demonstrations = demonstrations
+        self.generator = generator
+        self.base = None if base is None else base.digest
+        self.model = make_model(self.observed, len(self.objectives), config, generator, base)
+        self.ppo = PPO(self.model, config.ppo)
+        self.discriminator = Ensemble(config.window, self.observed.frame_dim, config.discriminator, generator)
+        # known before the first update, lest that judges windows in raw units and every later one in other units
+        self._observe_demonstrations()
+        self.masks = FeatureMasks(demonstrations)
+        self.optimizer = adam((self.discriminator.parameters(), config.discriminator.learning_rate))
+        self._parts = {"ppo": self.ppo, "discriminator": self.discriminator, "optimizer": self.optimizer}
+        self._playing = False
+
+    def act(self, obs: Obs, *, deterministic: bool = False) -> Step:
+        told = self.observed.beside(obs)
+        return Step(*self.model.act(self.observed.state(obs), told, self.generator, deterministic))
+
+    def value(self, obs: Obs, extras: dict[str, Tensor]) -> Tensor:
+        """Expected returns `[..., 2]` of goal and imitation."""
+        return self.model.value(self.observed.state(obs), self.observed.beside(obs))
+
+    def reset(self, env_ids: Tensor) -> None:
+        """Nothing lasts from step to step: the history is observed."""
+
+    @torch.no_grad()
+    def rewards(self, rollout: Rollout) -> dict[str, Tensor]:
+        """Eq. 11 as the term "imitation" `[T, N]`."""
+        scores = [
+            imitation_reward(self.discriminator.logits(window, mask=self.masks.draw(len(window), self.generator)))
+            for window in rollout["next_window"]
+        ]
+        return {"imitation": torch.stack(scores)}
+
+    def update(self, rollout: Rollout) -> dict[str, float]:
+        """The discriminators by eq. 10, policy and critics by eq. 9, or by eq. 12 with a base.
+
+        Raises:
+            AgentError: the policy was blended of two or merged, and is for playing only.
+        """
+        if self._playing:
+            raise AgentError("a policy with two adapters, or merged with them, is for playing and learns no more")
+        generator, config, means = self.generator, self.config.discriminator, Means()
+        windows = rollout.flat("next_window")
+        for _ in range(config.epochs):
+            for rows in rollout.minibatches(config.minibatch, generator):
+                drawn = self.demonstrations(len(rows), generator)
+                agent = Windows(windows[rows], mask=self.masks.draw(len(rows), generator))
+                demonstration = Windows(drawn["window"], mask=drawn.get("mask"))
+                loss = hinge_loss(self.discriminator, agent, demonstration, config.gradient_penalty, generator)
+                minimise(self.optimizer, loss.parts)
+                means.add({**loss.parts, **loss.scores})
+
+        told = self.observed.told
+        seen = Rollout(*rollout.shape)
+        for name in ("action", "log_prob", "advantage", "return", *told):
+            seen[name] = rollout[name]
+        seen["state"] = self.observed.state({"state": rollout["state"]})
+        ppo = self.ppo.update(seen, generator, fields=told, condition=self._tell, extra_loss=self._regularise)
+        self.discriminator.normalizer.update(rollout["next_window"])
+        self._observe_demonstrations()
+        return named("discriminator", means.result()) | named("ppo", ppo)
+
+    def blend(self, alpha: float) -> None:
+        """How much of the adaptation acts, in [0, 1]; of two, alpha of the first and 1 - alpha of the second.
+
+        Raises:
+            AgentError: alpha is outside, or the policy is no adapted one.
+        """
+        self._adapted("blended").blend(alpha)
+
+    def join(self, other: "AdaptNet") -> None:
+        """Take in the adapter of another adaptation of the same base, to blend the two.
+
+        Raises:
+            AgentError: it adapts another base.
+        """
+        own, theirs = self._adapted("joined"), other._adapted("joined")
+        if self.base != other.base:
+            raise AgentError(f"{_another(other.base, self.base)}; adapters of one base alone can be blended")
+        own.join(theirs.adapters[0])
+        self.model.state_normalizer.normalizers.append(other.model.state_normalizer.normalizers[1])
+        self._playing = True
+
+    def merge(self) -> None:
+        """Make one network of policy and adapters, as they are blended now; it acts the same, to 1e-5.
+
+        Raises:
+            AgentError: the adapters are of a kind that cannot be merged.
+        """
+        self.model.policy = merge(self._adapted("merged"))
+        self._playing = True
+
+    def state_dict(self) -> dict[str, Any]:
+        return {**state_of(self._parts), "base": self.base}
+
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        if "base" in state and state["base"] != self.base:
+            raise AgentError(f"{_another(state['base'], self.base)}; name the base that it was trained on")
+        load_parts(self._parts, state)
+
+    def _adapted(self, what: str) -> AdaptedPolicy:
+        policy = self.model.policy
+        if not isinstance(policy, AdaptedPolicy):
+            raise AgentError(f"a policy without adapters cannot be {what}; adapt one with agent.method=adaptnet")
+        return policy
+
+    def _observe_demonstrations(self) -> None:
+        drawn = self.demonstrations(self.config.discriminator.minibatch, self.generator)
+        self.discriminator.observe(drawn["window"], drawn.get("mask"))
+
+    def _tell(self, batch: Minibatch) -> dict[str, Tensor]:
+        """What policy and critics are told; of an adapted policy also its injection, which is penalised too."""
+        policy, told = self.model.policy, self.observed.beside(batch)
+        if isinstance(policy, AdaptedPolicy) and policy.adapters[0].spaces:
+            batch[INJECTION] = policy.injection(batch["state"], told)
+            return {**told, INJECTION: batch[INJECTION]}
+        return told
+
+    def _regularise(self, batch: Minibatch, parameters: Tensor) -> dict[str, Tensor]:
+        """The penalties of eq. 12, and the weight decay of FT + Reg."""
+        config, policy, penalties = self.config, self.model.policy, {}
+        if INJECTION in batch:
+            penalties["injection"] = config.injection_penalty * batch[INJECTION].norm(dim=-1).mean()
+        if isinstance(policy, AdaptedPolicy):
+            penalties["decay"] = config.weight_decay * policy.adapters[0].size()
+        elif self.base is not None and config.method == "finetune":
+            squares = torch.stack([parameter.square().sum() for parameter in policy.parameters()])
+            penalties["decay"] = config.weight_decay * squares.sum()
+        return penalties
+
+
+def _another(theirs: str | None, ours: str | None) -> str:
+    shown = [digest[:12] if digest else "none" for digest in (theirs, ours)]
+    return f"the adapter's base is another policy (digest {shown[0]}) than this one's ({shown[1]})"
