@@ -1,5 +1,8 @@
 """Precision training's reward for the style (CALM, section 6.1): latents near the encodings of a commanded motion."""
 
+from dataclasses import dataclass
+from typing import Literal, get_args
+
 import torch
 from torch import Tensor
 
@@ -7,7 +10,29 @@ from murmillo.agents.calm.agent import CALM
 from murmillo.agents.common.errors import AgentError
 from murmillo.agents.common.interface import Demonstrations, Obs
 
-FORMS = ("distance", "cosine")
+Form = Literal["distance", "cosine"]
+"""Of `style_similarity`."""
+FORMS: tuple[str, ...] = get_args(Form)
+
+
+@dataclass
+class PrecisionConfig:
+    """Which styles are commanded, and what a latent near one is worth.
+
+    Attributes:
+        samples: M, encodings of each style, the nearest of which counts; the paper has 1, the released code 32.
+        form: "distance" is the paper's, "cosine" the released code's; see `style_similarity`.
+        skills: names of the styles; the paper has running, walking and walking crouched. None named leaves the choice
+            to who makes the environment.
+    """
+
+    samples: int = 1
+    form: Form = "distance"
+    skills: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.samples < 1:
+            raise AgentError(f"precision.samples={self.samples}: needs at least 1; the paper has 1")
 
 
 def style_similarity(latent: Tensor, reference: Tensor, form: str) -> Tensor:

@@ -9,7 +9,7 @@ from murmillo.cli.comparison.record import Run
 from murmillo.cli.comparison.statistics import bootstrap_interval
 from murmillo.cli.metrics import EPISODE_LENGTH, STYLE, Metric
 from murmillo.cli.plots import Scalars, smooth
-from murmillo.cli.tasks.metrics import TASK
+from murmillo.cli.tasks.metrics import SIMILARITY, TASK
 
 _COVERAGES = (
     Metric("coverage", "Coverage", "share", 3, "of the clips"),
@@ -23,7 +23,7 @@ _AXES = {"samples": ("samples [million]", 1e6), "seconds": ("training time [h]",
 def plot_all(groups: list[Group], folder: Path) -> list[Path]:
     """One PNG a metric, against samples and against hours, of those that a group has a curve of; their paths."""
     paths = []
-    for metric in (TASK, STYLE, EPISODE_LENGTH, *_COVERAGES):
+    for metric in (TASK, SIMILARITY, STYLE, EPISODE_LENGTH, *_COVERAGES):
         shown = [one for one in groups if all(_points(run, metric.scalar) > 1 for run in one.runs)]
         if metric is TASK:  # every run logs one, and without a task it is 0
             shown = [one for one in shown if "choices.task" in one.settings]

@@ -1,10 +1,15 @@
 """Combinations of settings that cannot be, refused before anything is made."""
 
+from dataclasses import asdict
+from typing import Any
+
+from murmillo.agents.calm.precision import PrecisionConfig
 from murmillo.agents.common.latent_env import LatentEnvConfig
 from murmillo.cli.checks import check_training
 from murmillo.cli.errors import CommandError
 from murmillo.cli.tasks.config import TaskTrainConfig
 from murmillo.cli.tasks.low import LowRun
+from murmillo.cli.tasks.names import commands_skills, task_names
 
 _LEAST = {
     1: (
@@ -41,3 +46,16 @@ def check_settings(config: TaskTrainConfig, below: LowRun | None) -> None:
             f"agent.gumbel={config.agent.gumbel}: this policy chooses no labels; only one over a run of agent=case "
             "does, in a task where no user commands them"
         )
+    if not config.commands_styles:
+        for name, value in asdict(PrecisionConfig()).items():
+            if (asked := getattr(config.precision, name)) != value:
+                tasks = ", ".join(task for task in task_names() if commands_skills(task))
+                raise CommandError(
+                    f"precision.{name}={_shown(asked)}: no styles are commanded here; only over a run of agent=calm, "
+                    f"in a task that commands skills ({tasks})"
+                )
+
+
+def _shown(value: Any) -> str:
+    """As on the command line."""
+    return f"[{','.join(value)}]" if isinstance(value, tuple) else str(value)

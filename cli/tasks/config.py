@@ -10,6 +10,7 @@ from hydra.core.config_store import ConfigStore
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 
+from murmillo.agents.calm.precision import PrecisionConfig
 from murmillo.agents.case.high_level import HybridConfig
 from murmillo.agents.common.latent_env import LatentEnvConfig
 from murmillo.agents.common.runner import RunnerConfig
@@ -19,7 +20,7 @@ from murmillo.cli.errors import CommandError
 from murmillo.cli.schema import build, twin_of
 from murmillo.cli.tasks import low as low_runs
 from murmillo.cli.tasks.low import NONE, SCRATCH, LowRun
-from murmillo.cli.tasks.names import task_class, task_names
+from murmillo.cli.tasks.names import commands_skills, task_class, task_names
 from murmillo.cli.tasks.words import value_of
 from murmillo.cli.translate import command_error
 from murmillo.envs import EnvConfig
@@ -59,6 +60,7 @@ class TaskTrainConfig:
         low: folder of the run whose policy is followed, or "none".
         agent: the policy that is trained.
         latent_env: its decisions, where there is a policy below.
+        precision: the styles of CALM's precision training.
         env: the low-level run's environment, but begun standing.
         choices: the task, the agent below ("scratch" where there is none) and the budget.
         num_envs: worlds that are simulated together.
@@ -70,6 +72,7 @@ class TaskTrainConfig:
     low: str
     agent: HybridConfig = field(default_factory=HybridConfig)
     latent_env: LatentEnvConfig = field(default_factory=LatentEnvConfig)
+    precision: PrecisionConfig = field(default_factory=PrecisionConfig)
     env: EnvConfig = field(default_factory=EnvConfig)
     runner: RunnerConfig = field(default_factory=lambda: RunnerConfig(reward_weights={"task": 1.0}))
     run: TaskRunConfig = field(default_factory=TaskRunConfig)
@@ -82,6 +85,11 @@ class TaskTrainConfig:
         """The task with its arguments. Raises SuiteError where one cannot be."""
         cls: Any = task_class(self.choices["task"])
         return cls(self.task)
+
+    @property
+    def commands_styles(self) -> bool:
+        """CALM's precision training: the task commands skills, and the latents are to lie near their encodings."""
+        return _is_precision(self.choices["task"], self.choices["agent"])
 
 
 def compose_task(words: list[str]) -> TaskTrainConfig:
@@ -103,9 +111,10 @@ def compose_task(words: list[str]) -> TaskTrainConfig:
             "policy that acts itself"
         )
     below = low_runs.find(low)
-    composed, choices = _compose(name, below, [word for word in words if not word.lstrip("+").startswith("task=")])
-    config = _typed(composed, {"task": name, "agent": choices["agent"], "budget": choices["budget"]})
-    config.agent.skill = config.agent.skill or _is_told_skills(config)
+    kind = SCRATCH if below is None else below.kind
+    composed, choices = _compose(name, kind, below, [w for w in words if not w.lstrip("+").startswith("task=")])
+    config = _typed(composed, {"task": name, "agent": kind, "budget": choices["budget"]})
+    config.agent.skill = config.agent.skill or config.commands_styles or _is_told_labels(config)
     return config
 
 
@@ -122,20 +131,24 @@ def load(folder: Path, words: list[str] | None = None) -> TaskTrainConfig:
         return _typed(merge(known, saved, words or []), choices)
 
 
-def _is_told_skills(config: TaskTrainConfig) -> bool:
+def _is_told_labels(config: TaskTrainConfig) -> bool:
     """C·ASE's user-controlled policies: the label comes from outside, and the policy learns the latent for it."""
     return config.choices["agent"] == "case" and config.make_task().skill_steps > 0
 
 
-def _compose(task: str, below: LowRun | None, words: list[str]) -> tuple[DictConfig, Mapping[str, Any]]:
-    """Hydra's configuration and choices; the agent is the low-level run's."""
-    kind = SCRATCH if below is None else below.kind
+def _is_precision(task: str, kind: str) -> bool:
+    return kind == "calm" and commands_skills(task)
+
+
+def _compose(task: str, kind: str, below: LowRun | None, words: list[str]) -> tuple[DictConfig, Mapping[str, Any]]:
+    """Hydra's configuration and choices; the agent is of the low-level run's kind."""
     asked = value_of(words, "agent")
     if asked is not None and asked != kind:
         has = "there is no policy below to be of a kind" if below is None else f"low={below.word} is a run of {kind}"
         raise CommandError(f"agent={asked}: {has}; write agent={kind}, or leave it out")
     ConfigStore.instance().store(name="task_schema", node=twin_of(_defaults(task, below)))
-    return compose_words([*words, f"agent={kind}"], FILES)
+    file = f"{kind}_precision" if _is_precision(task, kind) else kind
+    return compose_words([*words, f"agent={file}"], FILES)
 
 
 def _defaults(task: str, below: LowRun | None) -> TaskTrainConfig:

@@ -9,7 +9,7 @@ from murmillo.cli.evaluation.identity import checkpoint_digest
 from murmillo.cli.tasks import low, table
 from murmillo.cli.tasks.config import TaskTrainConfig
 from murmillo.cli.tasks.low import LowRun
-from murmillo.cli.tasks.measuring import measure
+from murmillo.cli.tasks.measuring import Measured, measure
 
 SEED = 12345
 
@@ -29,6 +29,9 @@ def evaluate(
     saved = checkpoint.load(folder / runs.LAST)
     low.check_unchanged(below, saved)
     measured = measure(config, below, folder / runs.LAST, worlds, seed)
+    protocols = ["one episode a world, mean actions"]
+    if config.commands_styles:
+        protocols.append("one style an episode")
     results = {
         "run": folder.name,
         "task": config.choices["task"],
@@ -42,11 +45,20 @@ def evaluate(
         "metrics": {
             "task": {
                 "title": "The task",
-                "protocols": ["one episode a world, mean actions"],
-                "figures": table.entries(measured),
-            }
+                "protocols": protocols,
+                "figures": table.entries(measured.all),
+            },
+            **_styles(measured, protocols),
         },
     }
     (folder / runs.EVALUATION).mkdir(exist_ok=True)
     runs.write_json(folder / runs.METRICS, results)
     return results
+
+
+def _styles(measured: Measured, protocols: list[str]) -> dict[str, Any]:
+    """What `metrics` has of the single styles; nothing where none is commanded."""
+    figures: dict[str, Any] = {}
+    for style in sorted({style for found in measured.styles.values() for style in found}):
+        figures |= table.entries({player: found[style] for player, found in measured.styles.items()}, style)
+    return {"styles": {"title": "Style by style", "protocols": protocols, "figures": figures}} if figures else {}

@@ -74,19 +74,21 @@ class LowRun:
             raise CommandError(f"low={self.word}: {error}") from None
 
 
-def find(word: str) -> LowRun | None:
-    """The run that `low=word` names; None for `none`.
+def find(word: str, setting: str = "low") -> LowRun | None:
+    """The run that `low=word` names, or another setting that wants such a run; None for `none`.
 
     Raises:
         CommandError: there is no such run, it has no checkpoint, or it has learned a task itself.
     """
     if word == NONE:
         return None
-    folder = runs.existing(word, "low")
+    folder = runs.existing(word, setting)
     if is_task_run(word):
-        raise CommandError(f"low={word}: this run has learned a task itself; name a run of ase, calm or case")
+        raise CommandError(f"{setting}={word}: this run has learned a task itself; name a run of ase, calm or case")
     if not all((folder / runs.LAST / name).is_file() for name in (META, TENSORS)):
-        raise CommandError(f"low={word}: this run has no checkpoint; train it first: murmillo train run.resume={word}")
+        raise CommandError(
+            f"{setting}={word}: this run has no checkpoint; train it first: murmillo train run.resume={word}"
+        )
     return LowRun(word, folder, configuration.load(folder))
 
 

@@ -9,6 +9,13 @@ TASK = Metric(
     3,
     "the task's reward of a control step, mean over the worlds, with exploration noise on top. Up is good.",
 )
+SIMILARITY = Metric(
+    "reward/similarity",
+    "Similarity to the commanded style",
+    "",
+    3,
+    "how near the chosen latent lies to an encoding of the commanded skill (CALM, eq. 8): 1 is on it. Up is good.",
+)
 _VALUE = Metric(
     "ppo/value",
     "Critic's loss",
@@ -29,4 +36,4 @@ def training_metrics(steps: int) -> tuple[Metric, ...]:
         0,
         f"{took} from a start to a fall, an end of the task's own or the clock.",
     )
-    return (TASK, STYLE, RESIDUAL, length, FALL_RATE, _VALUE)
+    return (TASK, SIMILARITY, STYLE, RESIDUAL, length, FALL_RATE, _VALUE)

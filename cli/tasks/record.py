@@ -39,7 +39,7 @@ def film(folder: Path, settings: TaskRecordConfig, out: Path) -> Path:
     beside = out.with_name(f".{out.stem}.part.mp4")
     try:
         policy = load_policy(config, world, folder / runs.LAST)
-        _command(world.env, settings.skill)
+        _command(config, world.env, settings.skill)
         obs, _ = world.decisions.reset(seed=settings.seed)
         rate = world.env.metadata["render_fps"]
         frames = _Frames(world.env, max(1, round(settings.seconds * rate)))
@@ -78,14 +78,20 @@ class _Frames:
         self._drawn.clear()
 
 
-def _command(env: Any, skill: str | None) -> None:
+def _command(config: Any, env: Any, skill: str | None) -> None:
     """Have this skill drawn for every episode, and whenever another one is due.
 
     Raises:
         SuiteError: there is none of that name.
+        CommandError: the run has not learned that one.
     """
     import torch
 
-    if skill is not None:
-        env.set_skill(skill)  # refuses one that there is not
-        env.set_skill_weights(torch.tensor([float(name == skill) for name in env.skills]))
+    from murmillo.cli.tasks.styles import check_style
+
+    if skill is None:
+        return
+    env.set_skill(skill)  # refuses one that there is not
+    if config.commands_styles:
+        check_style(skill, config.precision.skills, env.library)
+    env.set_skill_weights(torch.tensor([float(name == skill) for name in env.skills]))

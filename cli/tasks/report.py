@@ -66,13 +66,15 @@ def _figures(config: Any, results: dict[str, Any] | None) -> str:
         if config.low != NONE
         else ""
     )
+    styles = " One style is commanded throughout an episode." if "styles" in results["metrics"] else ""
     return "\n\n".join(
         text
         for text in (
             "## Does it do the task?",
             f"{results['trajectories']:,} episodes for each, begun as `env.starts` says, with mean actions, after "
-            f"{results['samples']:,} samples, seed {results['seed']}.{random}",
+            f"{results['samples']:,} samples, seed {results['seed']}.{styles}{random}",
             table.markdown(results),
+            table.styles_markdown(results),
             table.meanings(results),
             table.published(results["task"]),
         )

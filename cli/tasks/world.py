@@ -15,6 +15,7 @@ from murmillo.agents.common.latent_env import LatentEnv, Results
 from murmillo.agents.common.task_agent import TaskAgent
 from murmillo.cli.tasks.config import TaskTrainConfig
 from murmillo.cli.tasks.low import LowRun
+from murmillo.cli.tasks.styles import style_reward, style_weights
 from murmillo.envs import HumanoidVectorEnv
 from murmillo.envs.observations import state_dim
 
@@ -57,13 +58,18 @@ class World:
         try:
             self.hybrid = config.choices["agent"] == "case" and not self.env.task.skill_steps
             self._observers: list[OnStep] = []
+            if config.commands_styles:
+                self.env.set_skill_weights(style_weights(config.precision.skills, self.env.library))
             self.decisions: VectorEnv = self.env
             if below is not None:
                 low = below.load(self.env)
                 decoder = HybridDecoder(len(self.env.skills), low.latent_dim) if self.hybrid else None
                 terms = config.latent_env.terms if judged else ()
                 decided = dataclasses.replace(config.latent_env, terms=terms)
-                self.decisions = LatentEnv(self.env, low, decided, decoder=decoder, on_step=self._observers)
+                nearness = style_reward(config, self.env, low) if config.commands_styles else None
+                self.decisions = LatentEnv(
+                    self.env, low, decided, decoder=decoder, latent_terms=nearness, on_step=self._observers
+                )
         except BaseException:
             self.env.close()
             raise

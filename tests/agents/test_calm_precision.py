@@ -8,7 +8,7 @@ import pytest
 import torch
 from torch.nn import functional as F
 
-from murmillo.agents.calm.precision import StyleReward, encode_styles, style_similarity
+from murmillo.agents.calm.precision import PrecisionConfig, StyleReward, encode_styles, style_similarity
 from murmillo.agents.common.errors import AgentError
 from murmillo.agents.common.latent_env import LatentEnv
 from tests.agents.toy import MOTION_FRAMES, PointMass, make_calm
@@ -53,6 +53,30 @@ def test_references_encode_motions_of_their_style(generator: torch.Generator) ->
     torch.testing.assert_close(reference.flatten(0, 1), agent.encode(drawn["window"]))
 
 
+def test_references_leave_out_what_their_clips_do_not_show(generator: torch.Generator) -> None:
+    """A skill of several clips, each masked or not as it came; what is made up changes nothing."""
+    env = PointMass(2, skills=3)
+    agent = make_calm(env, generator)
+
+    def demonstrations(made_up: float) -> Any:
+        def draw(n: int, generator: torch.Generator, skill: Any = None, frames: Any = None) -> dict:
+            drawn = env.demonstrations(n, generator, skill, frames)
+            mask = torch.zeros(n, drawn["window"].shape[-1], dtype=torch.bool)
+            mask[::2, 1] = True
+            return {**drawn, "window": drawn["window"].masked_fill(mask[:, None], made_up), "mask": mask}
+
+        return draw
+
+    found = [
+        encode_styles(agent, demonstrations(made_up), 3, 4, torch.Generator().manual_seed(4)) for made_up in (0.3, 90.0)
+    ]
+    torch.testing.assert_close(*found)
+    unmasked = encode_styles(agent, env.demonstrations, 3, 4, torch.Generator().manual_seed(4))
+    same = torch.isclose(found[0], unmasked).all(-1)
+    assert same[:, 1::2].all()
+    assert not same[:, ::2].any()
+
+
 @pytest.mark.parametrize("form", ["distance", "cosine"])
 def test_the_style_that_is_commanded_counts(form: str, generator: torch.Generator) -> None:
     """As a term of a decision, beside the task's reward."""
@@ -70,3 +94,8 @@ def test_the_style_that_is_commanded_counts(form: str, generator: torch.Generato
 def test_another_form_is_refused() -> None:
     with pytest.raises(AgentError, match=r"precision\.form=squared is not one of distance, cosine"):
         StyleReward(torch.zeros(1, 1, 3), "squared")
+
+
+def test_a_style_needs_an_encoding() -> None:
+    with pytest.raises(AgentError, match=r"precision\.samples=0: needs at least 1"):
+        PrecisionConfig(samples=0)

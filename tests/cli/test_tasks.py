@@ -1,9 +1,10 @@
 """Tasks from the command to the report: over a tiny low-level run and without one, taken up again, measured, filmed."""
 
-import csv
 import itertools
 import json
+import os
 import shutil
+import signal
 import subprocess
 import sys
 from collections.abc import Callable
@@ -20,22 +21,9 @@ from murmillo.cli.tasks.checks import check_settings
 from murmillo.cli.tasks.config import compose_task
 from murmillo.cli.tasks.names import task_names
 from tests.cli.refusals import assert_refused
+from tests.cli.tiny_tasks import TINY_TASK, rows
 
 Murmillo = Callable[..., tuple[int, str, str]]
-
-TINY = (
-    "num_envs=4",
-    "runner.horizon=4",
-    "runner.samples=32",
-    "agent.ppo.hidden=[16]",
-    "agent.ppo.minibatch=8",
-    "agent.ppo.epochs=1",
-    "threads=1",
-    "env.episode_steps=12",
-    "run.measured_worlds=2",
-    "run.video=false",
-)
-"""Two iterations."""
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +31,7 @@ def located(trained: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a tiny run of ASE, `low`, and one that has learned Location over it, `high`; only to be read."""
     root, threads = tmp_path_factory.mktemp("tasks"), torch.get_num_threads()
     shutil.copytree(trained, root / "low")
-    assert main(["train", "task=location", f"low={root}/low", *TINY, f"run.root={root}", "run.name=high"]) == 0
+    assert main(["train", "task=location", f"low={root}/low", *TINY_TASK, f"run.root={root}", "run.name=high"]) == 0
     torch.set_num_threads(threads)
     return root
 
@@ -64,11 +52,6 @@ def own(located: Path, folder: Path) -> Path:
     return Path(shutil.copytree(located, folder / "runs"))
 
 
-def rows(folder: Path) -> list[dict[str, str]]:
-    with (folder / "scalars.csv").open(newline="") as file:
-        return list(csv.DictReader(file))
-
-
 # --- composing -------------------------------------------------------------------------------------------------------
 
 
@@ -84,7 +67,10 @@ def test_every_task_composes_at_every_budget(task: str) -> None:
 def test_every_file_of_the_groups_is_reached() -> None:
     conf = files("murmillo.conf.tasks")
     names = {group: {Path(str(p)).stem for p in conf.joinpath(group).iterdir()} for group in ("agent", "budget")}
-    assert names == {"agent": {"ase", "calm", "case", "scratch"}, "budget": {"smoke", "laptop", "paper"}}
+    assert names == {
+        "agent": {"ase", "calm", "calm_precision", "case", "scratch"},
+        "budget": {"smoke", "laptop", "paper"},
+    }
     pairs = {f"{agent}_{budget}" for agent, budget in itertools.product(names["agent"], names["budget"])}
     assert {Path(str(p)).stem for p in conf.joinpath("agent_budget").iterdir()} <= pairs
 
@@ -132,7 +118,7 @@ def test_a_run_leaves_all_that_it_should(located: Path) -> None:
 def test_resumed_run_equals_an_uninterrupted_one(murmillo: Murmillo, own: Path) -> None:
     status, _, err = murmillo("train", "run.resume=runs/high", "runner.samples=48")
     assert status == 0, err
-    whole = ("low=runs/low", "run.name=whole", *TINY, "runner.samples=48")
+    whole = ("low=runs/low", "run.name=whole", *TINY_TASK, "runner.samples=48")
     status, _, err = murmillo("train", "task=location", *whole)
     assert status == 0, err
     resumed, at_once = rows(own / "high")[-1], rows(own / "whole")[-1]
@@ -143,7 +129,7 @@ def test_resumed_run_equals_an_uninterrupted_one(murmillo: Murmillo, own: Path) 
 
 
 def test_scratch_and_its_report(murmillo: Murmillo, folder: Path) -> None:
-    status, _, err = murmillo("train", "task=steering", "low=none", *TINY, "run.name=alone")
+    status, _, err = murmillo("train", "task=steering", "low=none", *TINY_TASK, "run.name=alone")
     assert status == 0, err
     run = folder / "runs" / "alone"
     measures = json.loads((run / "measures.json").read_text())
@@ -176,7 +162,7 @@ def test_evaluation_and_comparison(murmillo: Murmillo, own: Path) -> None:
 def test_over_case_a_label_is_told_or_chosen(
     murmillo: Murmillo, folder: Path, labelled: Path, task: str, told: bool, chooses: bool
 ) -> None:
-    status, _, err = murmillo("train", f"task={task}", f"low={labelled}", "agent=case", *TINY, "run.name=high")
+    status, _, err = murmillo("train", f"task={task}", f"low={labelled}", "agent=case", *TINY_TASK, "run.name=high")
     assert status == 0, err
     run = folder / "runs" / "high"
     assert f"skill: {str(told).lower()}" in (run / "config.yaml").read_text()
@@ -197,6 +183,30 @@ def test_a_film_has_a_picture_of_every_control_step(own: Path, folder: Path) -> 
     assert done.returncode == 0, done.stderr
     assert count_frames_and_secs(str(own / "high" / "video.mp4"))[0] == 6
     assert not list((own / "high").glob(".*"))
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no such signals")
+def test_a_signal_ends_the_run_with_a_checkpoint_and_a_report(murmillo: Murmillo, folder: Path) -> None:
+    """Ctrl-C, and then the run is taken up again."""
+    words = ("task=location", "low=none", *TINY_TASK, "runner.samples=1000000000", "run.name=long")
+    command = [sys.executable, "-m", "murmillo.cli.main", "train", *words]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=folder) as process:
+        assert process.stdout is not None
+        for line in process.stdout:
+            if " samples, " in line:
+                process.send_signal(signal.SIGINT)
+                break
+        out, err = process.communicate(timeout=60)
+    assert process.returncode == 0, err
+    assert "go on with: murmillo train run.resume=runs/long" in out
+    run = folder / "runs" / "long"
+    assert "plots/learning_curve.png" in (run / "report.md").read_text()
+    assert not (run / "measures.json").exists()
+    done = int(rows(run)[-1]["samples"])
+    status, _, err = murmillo("train", "run.resume=runs/long", f"runner.samples={done + 16}")
+    assert status == 0, err
+    assert int(rows(run)[-1]["samples"]) == done + 16
+    assert "trained" in json.loads((run / "measures.json").read_text())
 
 
 # --- mistakes --------------------------------------------------------------------------------------------------------
@@ -227,7 +237,7 @@ def test_wrong_words(murmillo: Murmillo, folder: Path, words: tuple[str, ...], p
 
 
 def test_a_low_level_run_that_does_not_serve(murmillo: Murmillo, own: Path, folder: Path) -> None:
-    over = ("train", "task=location", *TINY, "run.name=new")
+    over = ("train", "task=location", *TINY_TASK, "run.name=new")
     assert_refused(murmillo(*over, "low=runs/low", "agent=calm"), "agent=calm", "run of ase", "agent=ase")
     assert_refused(murmillo(*over, "low=runs/high"), "low=runs/high", "learned a task itself")
     assert_refused(murmillo(*over, "low=runs/low", "env.window=4"), "env.window=4", "trained with 10")
@@ -242,7 +252,9 @@ def test_a_low_level_run_that_does_not_serve(murmillo: Murmillo, own: Path, fold
 def test_a_low_level_checkpoint_of_another_character(murmillo: Murmillo, own: Path) -> None:
     meta = own / "low" / "checkpoints" / "last" / "meta.json"
     meta.write_text(meta.read_text().replace('"sword_shield"', '"centaur"'))
-    assert_refused(murmillo("train", "task=location", "low=runs/low", *TINY, "run.name=new"), "low=runs/low", "centaur")
+    assert_refused(
+        murmillo("train", "task=location", "low=runs/low", *TINY_TASK, "run.name=new"), "low=runs/low", "centaur"
+    )
     assert not (own / "new").exists()
 
 
@@ -259,7 +271,7 @@ def test_a_low_level_run_that_has_changed_or_gone(murmillo: Murmillo, own: Path)
 
 
 def test_multirun_trains_one_run_for_each_value(murmillo: Murmillo, folder: Path) -> None:
-    words = ("task=location,speed", "low=none", *TINY, "runner.samples=16", "run.measured_worlds=1")
+    words = ("task=location,speed", "low=none", *TINY_TASK, "runner.samples=16", "run.measured_worlds=1")
     status, _, err = murmillo("train", "--multirun", *words)
     assert status == 0, err
     names = sorted(run.name[20:] for run in (folder / "runs").iterdir())
