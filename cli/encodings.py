@@ -1,6 +1,7 @@
 """How well an agent that encodes motions has ordered its latents."""
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import torch
@@ -25,6 +26,18 @@ def concentration(env: HumanoidVectorEnv, agent: Any) -> float | None:
         return None
     found = fisher_concentration(*encode_clips(agent, env.library))
     return found if math.isfinite(found) else None
+
+
+def encode_middles(agent: Any, library: MotionLibrary, names: Sequence[str]) -> Tensor:
+    """Encodings [n, Z] of the middles of the clips of these names, each as long as the agent's encoder sees.
+
+    Raises:
+        MotionError: a name that no clip has.
+    """
+    motions = library.middle(names, agent.encoder.frames)
+    known = [clip.name for clip in library.clips]
+    mask = None if library.mask is None else library.mask[[known.index(name) for name in names]]
+    return agent.encode(motions, mask)
 
 
 def encode_clips(agent: Any, library: MotionLibrary) -> tuple[Tensor, Tensor]:

@@ -15,18 +15,29 @@ murmillo evaluate: measure a trained agent as the papers do
   metrics        quick            quick, all, or some of: coverage, transitions, frechet, diversity, concentration,
                                   inception, controllability, residual, quality, recovery; metrics=[coverage,frechet]
   trajectories   256, or 1000     for each source and protocol; the papers have 1,000 (ASE) and 10,000 (C·ASE)
+  checkpoint     last             last, or all: those too that the run kept on its way (train … run.keep_every=SAMPLES),
+                                  for the curve of coverage against samples
   seed           12345            of all that is random
   start          default          default or reference: a standing pose, or random moments of the clips
   worlds         64               episodes that the policy is measured in before and after training, 0 for none
   motions        the run's own    a folder or file, where the clips have moved; other clips are not comparable
+
+Writes evaluation.md, evaluation.html and evaluation/ into the run's folder. What is recorded stays there: the same
+command goes on where it was stopped. docs/metrics.md says how each metric is measured.
 
 Of a run that learned a task (murmillo train task=…): its normalised return beside that of the untrained policy and of
 random latents, in worlds=256 episodes, as a table and in report.md; it takes seed, motions and
 
   low            the run's own    folder of the low-level run, where it has moved
 
-Writes evaluation.md, evaluation.html and evaluation/ into the run's folder. What is recorded stays there: the same
-command goes on where it was stopped. docs/metrics.md says how each metric is measured.
+  murmillo evaluate machine=strike run=runs/<calm> heading=runs/<precision>     a state machine does a task, untrained
+
+Its success rate beside CALM's, time to success and time in each state, and every transition in machines/ of the run's
+folder; it takes seed, motions, worlds=64, seconds (an attempt's), parameters of the machine (style=walk_forward) and
+
+  machine        needed           location, strike or a YAML file (docs/machines.md)
+  run            needed           folder of a run of agent=calm
+  heading        where needed     folder of a run of task=direction over it, by which states go somewhere
 """
 
 _QUICK_TRAJECTORIES = 256
@@ -44,16 +55,22 @@ class EvaluateConfig:
     start: Literal["default", "reference"] = "default"
     worlds: int = 64
     motions: str | None = None
+    checkpoint: Literal["last", "all"] = "last"
 
 
 def run(words: list[str]) -> int:
     """Measure, print the figures and write the reports."""
     from murmillo.cli import config as configuration
     from murmillo.cli import runs
-    from murmillo.cli.evaluation.evaluating import Request, evaluate
+    from murmillo.cli.evaluation.bench import Request
+    from murmillo.cli.evaluation.evaluating import evaluate
     from murmillo.cli.seeds import check_seed
     from murmillo.cli.tasks.words import is_task_run, value_of
 
+    if value_of(words, "machine") is not None:
+        from murmillo.cli.machines.evaluate import run as evaluate_machine
+
+        return evaluate_machine(words)
     if is_task_run(value_of(words, "run")):
         from murmillo.cli.tasks.evaluate import run as evaluate_task
 
@@ -71,7 +88,15 @@ def run(words: list[str]) -> int:
         raise CommandError("metrics=[]: name some, or quick or all")
     folder = runs.existing(settings.run, "run")
     config = configuration.load(folder)
-    request = Request(settings.metrics, trajectories, settings.seed, settings.start, settings.worlds, settings.motions)
+    request = Request(
+        settings.metrics,
+        trajectories,
+        settings.seed,
+        settings.start,
+        settings.worlds,
+        settings.motions,
+        along=settings.checkpoint == "all",
+    )
     try:
         results = evaluate(config, folder, request)
     except KeyboardInterrupt:

@@ -13,13 +13,14 @@ murmillo: simulated sword-and-shield fighters that learn skills from motion clip
   murmillo evaluate   measure a trained agent:       murmillo evaluate run=runs/<name>
   murmillo compare    put runs side by side:         murmillo compare 'runs/*'
   murmillo record     film a trained agent:          murmillo record run=runs/<name>
+  murmillo play       steer it in a browser:         murmillo play run=runs/<name>
   murmillo motions    import motion clips, look at them, label them
   murmillo doctor     look at this machine: versions, graphics, threads, GPU, speed
 
 `murmillo <command> --help` says what a command takes. Settings are written name=value.
 """
 
-COMMANDS = ("train", "evaluate", "compare", "record", "motions", "doctor")
+COMMANDS = ("train", "evaluate", "compare", "record", "play", "motions", "doctor")
 
 
 def main(argv: list[str] | None = None) -> int:

@@ -5,7 +5,7 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from murmillo.cli import gl
 from murmillo.cli.errors import CommandError
@@ -25,6 +25,16 @@ murmillo record: film a trained agent
   seed      1                of the start
   motions   the run's own    a folder or file, where the clips have moved
   low       the run's own    of a run that learned a task: folder of the low-level run, where it has moved
+
+  murmillo record machine=location run=runs/<calm> heading=runs/<precision>
+                                                     a task done by a state machine, with its state in the picture
+
+  machine   needed           location, strike or a YAML file (docs/machines.md)
+  run       needed           folder of a run of agent=calm
+  heading   where needed     folder of a run of task=direction over it, by which states go somewhere
+  seconds   an attempt's     length of the film
+  out       by machine       file, in the run's folder unless it is a path
+  style=walk_forward and the like set the machine's parameters; camera, seed and motions as above
 
 A run that learned a task is shown with its goals; it follows no clips.
 Works without a screen, through EGL or OSMesa; `murmillo doctor` says whether this machine has one of them.
@@ -51,31 +61,54 @@ def run(words: list[str]) -> int:
     # MuJoCo reads its choice when it is imported, so nothing that imports it may come before this line
     tried = gl.candidates()
     backend = gl.choose()
-    from murmillo.cli import config as configuration
     from murmillo.cli import runs
     from murmillo.cli.seeds import check_seed
-    from murmillo.cli.tasks import record as tasks
-    from murmillo.cli.tasks.words import is_task_run, value_of
 
-    of_task = is_task_run(value_of(words, "run"))
-    settings = configuration.parse(tasks.TaskRecordConfig if of_task else RecordConfig, words)
-    if not 0.0 < settings.seconds < math.inf:  # so written, a NaN is refused too
-        raise CommandError(f"seconds={settings.seconds:g}: needs a number above 0")
-    if isinstance(settings, RecordConfig) and settings.blend and len(settings.clips) < 2:
-        raise CommandError("blend=true: goes from one clip to the next; name two or more, clips=[walk_forward,kick]")
-    check_seed("seed", settings.seed)
-    folder = runs.existing(settings.run, "run")
-    out = Path(settings.out) if os.path.dirname(settings.out) else folder / settings.out
+    planned = _plan(words)
+    if not 0.0 < planned.seconds < math.inf:  # so written, a NaN is refused too
+        raise CommandError(f"seconds={planned.seconds:g}: needs a number above 0")
+    check_seed("seed", planned.seed)
+    folder = runs.existing(planned.run, "run")
+    out = Path(planned.out) if os.path.dirname(planned.out) else folder / planned.out
     if out.suffix != ".mp4" or out.is_dir() or not out.parent.is_dir():
-        raise CommandError(f"out={settings.out}: needs a file name that ends in .mp4, in a folder that exists")
+        raise CommandError(f"out={planned.out}: needs a file name that ends in .mp4, in a folder that exists")
     if backend is None:
         raise CommandError(gl.no_gl_message(tried))
-    if isinstance(settings, RecordConfig):
-        film(configuration.load(folder), folder, settings, out)
-    else:
-        tasks.film(folder, settings, out)
-    print(f"filmed {settings.seconds:g} s: {out}")
+    planned.make(folder, out)
+    print(f"filmed {planned.seconds:g} s: {out}")
     return 0
+
+
+class _Film(NamedTuple):
+    """What is to be filmed: the run, how long, where to, from which seed, and by what from the two folders."""
+
+    run: str
+    seconds: float
+    out: str
+    seed: int
+    make: Callable[[Path, Path], Any]
+
+
+def _plan(words: list[str]) -> _Film:
+    """A machine, a run that has learned a task, or one that has learned from clips."""
+    from murmillo.cli import config as configuration
+    from murmillo.cli.tasks.words import is_task_run, value_of
+
+    if value_of(words, "machine") is not None:
+        from murmillo.cli.machines import record as machines
+
+        return _Film(*machines.plan(words))
+    if is_task_run(value_of(words, "run")):
+        from murmillo.cli.tasks import record as tasks
+
+        task = configuration.parse(tasks.TaskRecordConfig, words)
+        return _Film(task.run, task.seconds, task.out, task.seed, lambda folder, out: tasks.film(folder, task, out))
+    own = configuration.parse(RecordConfig, words)
+    if own.blend and len(own.clips) < 2:
+        raise CommandError("blend=true: goes from one clip to the next; name two or more, clips=[walk_forward,kick]")
+    return _Film(
+        own.run, own.seconds, own.out, own.seed, lambda folder, out: film(configuration.load(folder), folder, own, out)
+    )
 
 
 def film(config: Any, folder: Path, settings: RecordConfig, out: Path) -> Path:
@@ -131,6 +164,7 @@ def _follower(settings: RecordConfig, player: Any, env: Any) -> Callable[[float]
         CommandError: the agent follows no clips.
     """
     from murmillo.agents.common.latents import interpolate
+    from murmillo.cli.encodings import encode_middles
 
     if not settings.clips:
         return lambda part: None
@@ -138,11 +172,7 @@ def _follower(settings: RecordConfig, player: Any, env: Any) -> Callable[[float]
         raise CommandError(
             f"clips={list(settings.clips)}: this run's agent follows no clips; choose a run of agent=calm"
         )
-    library = env.library
-    motions = library.middle(settings.clips, player.encoder.frames)
-    names = [clip.name for clip in library.clips]
-    rows = [names.index(name) for name in settings.clips]
-    latents = player.encode(motions, None if library.mask is None else library.mask[rows])
+    latents = encode_middles(player, env.library, settings.clips)
 
     def follow(part: float) -> None:
         place = part * (len(latents) - 1 if settings.blend else len(latents))

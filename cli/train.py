@@ -27,12 +27,16 @@ Settings are written name=value. The first ones:
   run.name   by time, agent, budget and seed         folder of the run under run.root=runs
   run.evaluate  true                                 measure the quick metrics of `murmillo evaluate` at the end
   run.video  true                                    film the trained character at the end
+  run.keep_every                                     keep a checkpoint every so many samples, for the curves of
+                                                     `murmillo evaluate checkpoint=all`
 
 With task=… a high-level policy learns to choose what the agent of another run does; its first settings:
 
   task       reach, speed, steering, location, direction, relocation, path_follow, strike, block or recovery;
              its arguments are task.radius=5 and the like (docs/tasks.md)
   low        folder of a run of ase, case or calm, whose clips and character it takes over; or none
+  precision  over a run of calm, where the task commands skills: precision.skills=[run_forward,crouch_walk] are the
+             styles of CALM's precision training
   budget     smoke (10 minutes), laptop (2 hours), paper
   run.video, run.name, run.root, run.resume, seed, num_envs, threads: as above
 

@@ -25,8 +25,10 @@ from murmillo.cli.ages import measure_ages
 from murmillo.cli.checks import check_clips, check_settings
 from murmillo.cli.config import TrainConfig
 from murmillo.cli.errors import user_errors
-from murmillo.cli.evaluation.evaluating import Request, evaluate
+from murmillo.cli.evaluation.bench import Request
+from murmillo.cli.evaluation.evaluating import evaluate
 from murmillo.cli.evaluation.identity import clip_digests
+from murmillo.cli.evaluation.kept import Keeper
 from murmillo.cli.evaluation.table import QUICK
 from murmillo.cli.progress import Progress, make_progress
 from murmillo.envs import HumanoidVectorEnv
@@ -110,6 +112,8 @@ def _train(config: TrainConfig, env: HumanoidVectorEnv, folder: Path, resuming: 
         runner.on_iteration = [
             lambda scalars: progress.show(int(scalars["samples"]), time.monotonic() - begun, scalars)
         ]
+        if config.run.keep_every is not None:
+            runner.on_iteration.append(Keeper(runner, agent, config.run.keep_every, folder))
         runner.on_warning = [lambda text: progress.say(f"warning: {text}")]
         runner.run()
     _keep_skills(agent, env, folder)

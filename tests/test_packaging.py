@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-ROOMS = ("envs", "agents", "cli", "conf", "assets")
+ROOMS = ("envs", "agents", "viewer", "cli", "conf", "assets")
 NOT_SHIPPED = (".md", ".pyc")
 
 

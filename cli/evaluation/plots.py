@@ -72,7 +72,7 @@ def _frequencies(results: dict[str, Any], curves: dict[str, Any], history: list[
     axes.bar(np.arange(len(names)), 100 * counts[order] / counts.sum(), color=_COLOURS[TRAINED])
     axes.axhline(100 / len(names), color="#c8553d", linewidth=1.0, label="even")
     axes.set(ylabel="trajectories [%]", xlim=(-0.6, len(names) - 0.4))
-    _name(axes.set_xticks, names[order], rotation=90)
+    axes.set_xticks(np.arange(len(names)), names[order], rotation=90, fontsize=6)  # the picture is as wide as they need
     axes.legend(frameon=False)
     return figure
 
@@ -145,12 +145,13 @@ def _history(results: dict[str, Any], curves: dict[str, Any], history: list[dict
     figure = _figure()
     axes = _axes(figure)
     untrained = results["metrics"].get("coverage", {}).get("figures", {})
-    for name, colour in (("coverage", _COLOURS[TRAINED]), ("coverage_10", "#7aa6d1")):
+    # both show where they are one: of few trajectories
+    for name, colour, style in (("coverage", _COLOURS[TRAINED], "-"), ("coverage_10", "#7aa6d1", "--")):
         values = untrained.get(name, {}).get("values", {})
         begun = [(0.0, values[UNTRAINED]["value"])] if UNTRAINED in values else []
         points = np.array(begun + [(float(row["samples"]), float(row[name])) for row in alike])
         label = "coverage" if name == "coverage" else "filtered at 10 %"
-        axes.plot(points[:, 0], 100 * points[:, 1], color=colour, marker="o", label=label)
+        axes.plot(points[:, 0], 100 * points[:, 1], color=colour, linestyle=style, marker="o", label=label)
     axes.set(xlabel="samples", ylabel="coverage [%]", ylim=(0, 103))
     axes.legend(frameon=False)
     return figure

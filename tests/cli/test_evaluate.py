@@ -1,8 +1,13 @@
 """`murmillo evaluate` on a tiny run: what it writes, how it goes on, and what it refuses."""
 
 import json
+import os
 import re
 import shutil
+import signal
+import subprocess
+import sys
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -10,9 +15,11 @@ from typing import Any
 
 import pytest
 
+from murmillo.agents.common import checkpoint
 from murmillo.cli import runs
-from murmillo.cli.evaluation import evaluating
+from murmillo.cli.evaluation import bench, history
 from murmillo.cli.evaluation.chunks import ChunkStore
+from murmillo.cli.evaluation.kept import kept_checkpoints
 from murmillo.cli.evaluation.published import CONDITIONS, METHODS, PUBLISHED
 from murmillo.cli.evaluation.table import METRICS, NEEDS
 from murmillo.envs.character import load_character
@@ -81,7 +88,7 @@ def test_the_page_needs_nothing_beside_it(murmillo: Murmillo, own_run: Path) -> 
 
 @pytest.fixture
 def small_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(evaluating, "CHUNK", 2)
+    monkeypatch.setattr(bench, "CHUNK", 2)
 
 
 @pytest.mark.usefixtures("small_chunks")
@@ -116,6 +123,78 @@ def test_stopped_and_taken_up_again_it_ends_in_the_same_figures(
     assert len(saved) == 9
     assert murmillo("evaluate", "run=runs/tiny", "seed=2", *words)[0] == 0
     assert len(saved) == 15
+
+
+# as the fixtures have it, but in a process of its own, which a signal can reach wherever it is
+INTERRUPTED = f"""
+import sys
+from dataclasses import replace
+from murmillo.cli.evaluation import bench
+from murmillo.cli.evaluation.table import METRICS
+from murmillo.cli.main import main
+bench.CHUNK = 2
+METRICS["coverage"] = METRICS["coverage"]._replace(
+    protocols=tuple(replace(protocol, steps={STEPS}) for protocol in METRICS["coverage"].protocols)
+)
+sys.exit(main(sys.argv[1:]))
+"""
+
+
+@pytest.mark.usefixtures("small_chunks")
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGINT for one process")
+def test_a_signal_leaves_chunks_and_a_line_and_the_work_goes_on(murmillo: Murmillo, own_run: Path) -> None:
+    words = ("trajectories=24", "worlds=0", "metrics=coverage")
+    whole = Path(shutil.copytree(own_run, own_run.parent / "whole"))
+    command = [sys.executable, "-c", INTERRUPTED, "evaluate", "run=runs/tiny", *words]
+    chunks = own_run / "evaluation" / "chunks"
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        while process.poll() is None and not list(chunks.glob("*/*.safetensors")):
+            time.sleep(0.01)
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=60)
+    assert process.returncode == 130, err
+    assert err == ""
+    assert out.splitlines()[-1] == (
+        "stopped; what is recorded stays, go on with: murmillo evaluate run=runs/tiny "
+        "trajectories=24 worlds=0 metrics=coverage"
+    )
+    assert not (own_run / runs.METRICS).exists()
+    left = {path: path.stat().st_mtime_ns for path in chunks.glob("*/*.safetensors")}
+    assert 0 < len(left) < 36  # 12 of each source
+
+    assert murmillo("evaluate", "run=runs/tiny", *words)[0] == 0
+    assert murmillo("evaluate", "run=runs/whole", *words)[0] == 0
+    assert figures(own_run) == figures(whole)
+    assert {path: path.stat().st_mtime_ns for path in left} == left
+    assert len(list(chunks.glob("*/*"))) == 36  # and no half-written one
+
+
+def test_the_checkpoints_that_a_run_kept_make_a_curve(
+    murmillo: Murmillo, folder: Path, tiny: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    words = (*tiny, "runner.samples=256", "run.keep_every=100", "warm_start.steps=0", "run.name=long")
+    assert murmillo("train", *words)[0] == 0
+    run = folder / "runs" / "long"
+    kept = kept_checkpoints(run)
+    assert list(kept) == [128, 256]  # the first past 100 and past 200
+    assert checkpoint.load(kept[128])["agent"].keys().isdisjoint({"latents", "replay"})
+
+    saved, save = [], ChunkStore.save
+    monkeypatch.setattr(ChunkStore, "save", lambda self, *what: (saved.append(what[0]), save(self, *what)))
+    measured = ("evaluate", "run=runs/long", "checkpoint=all", "trajectories=3", "worlds=0")
+    assert murmillo(*measured, "metrics=coverage")[0] == 0
+    assert saved == ["trained", "trained", "untrained", "replayed"]  # at 128 samples the policy alone
+    assert [row["samples"] for row in history.read(run / runs.HISTORY)] == ["128", "256"]
+    assert (run / "evaluation" / "plots" / "history.png").is_file()
+    assert "Coverage against training samples" in (run / runs.EVALUATED).read_text()
+    assert results(run)["samples"] == 256
+
+    saved.clear()
+    assert murmillo(*measured, "metrics=[coverage]")[0] == 0
+    assert saved == []
+    assert murmillo(*measured, "metrics=quality")[0] == 0
+    assert [{"coverage", "jerk"} <= row.keys() for row in history.read(run / runs.HISTORY)] == [True, True]
+    assert not list((run / "evaluation").glob("chunks-*"))
 
 
 def test_metrics_that_were_measured_before_stay(murmillo: Murmillo, own_run: Path) -> None:
@@ -168,6 +247,8 @@ def test_training_ends_with_the_quick_set(murmillo: Murmillo, folder: Path, tiny
         (("worlds=-1",), ("worlds=-1",)),
         (("start=lying",), ("start", "lying")),
         (("motions=nowhere",), ("nowhere",)),
+        (("checkpoint=best",), ("checkpoint", "best")),
+        (("checkpoint=all",), ("kept none", "run.keep_every=SAMPLES")),
     ],
 )
 def test_wrong_words(murmillo: Murmillo, own_run: Path, words: tuple[str, ...], parts: tuple[str, ...]) -> None:

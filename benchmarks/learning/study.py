@@ -1,0 +1,104 @@
+"""A learning study: one set of clips, some settings, some seeds. Runs what is missing and keeps the curves.
+
+    python benchmarks/learning/study.py gamma             # runs/learning/gamma/, docs/learning/gamma.json and .png
+    python benchmarks/learning/study.py gamma --seeds 1   # one seed first
+
+A study is a file of `studies/`; its task is a line of `tasks.yaml`. Stop it at any time: the same command goes on.
+"""
+
+import argparse
+import json
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import yaml
+from results import collect, plot
+
+HERE = Path(__file__).parent
+RUNS = Path("runs/learning")
+RESULTS = HERE.parents[1] / "docs" / "learning"
+
+
+@dataclass(frozen=True)
+class Study:
+    """
+    Attributes:
+        name: of its file.
+        question: that it answers.
+        seeds: of each variant.
+        words: for `murmillo train`, of all runs; the task's and the number of samples among them.
+        variants: further words of each variant by its name.
+    """
+
+    name: str
+    question: str
+    seeds: tuple[int, ...]
+    words: tuple[str, ...]
+    variants: dict[str, tuple[str, ...]]
+
+    def words_of(self, variant: str, seed: int) -> list[str]:
+        """The words of one run, but for where it is kept."""
+        return [*self.words, *self.variants[variant], f"seed={seed}"]
+
+
+def read(name: str) -> Study:
+    """The study of this name. Exits with a line where there is none."""
+    file = HERE / "studies" / f"{name}.yaml"
+    if not file.is_file():
+        known = ", ".join(sorted(path.stem for path in file.parent.glob("*.yaml")))
+        sys.exit(f"study {name}: there is no such file in {file.parent}; there are: {known}")
+    content = yaml.safe_load(file.read_text(encoding="utf-8"))
+    tasks = yaml.safe_load((HERE / "tasks.yaml").read_text(encoding="utf-8"))
+    common = (
+        *tasks[content["task"]],
+        f"runner.samples={content['samples']}",
+        "runner.max_minutes=null",
+        *content.get("words", ()),
+    )
+    variants = {str(variant): tuple(words) for variant, words in content["variants"].items()}
+    return Study(name, content["question"], tuple(content.get("seeds", (1, 2, 3))), common, variants)
+
+
+def run(study: Study, variant: str, seed: int) -> bool:
+    """Train one run, from where it stopped if it was begun; whether it is there to its end."""
+    name = f"{variant}-{seed}"
+    folder = RUNS / study.name / name
+    words = study.words_of(variant, seed)
+    asked = folder.with_suffix(".json")
+    if folder.exists() and json.loads(asked.read_text(encoding="utf-8")) != words:
+        sys.exit(f"{folder}: was made with other settings; move it away, or give the variant another name")
+    if (folder / "measures.json").exists():
+        return True
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    if (folder / "checkpoints" / "last").exists():
+        words = [f"run.resume={folder}"]
+    else:
+        asked.write_text(json.dumps(words), encoding="utf-8")
+        words += [f"run.root={folder.parent}", f"run.name={name}", "run.video=false", "run.evaluate=false"]
+    print(f"{study.name}: {name}", flush=True)
+    done = subprocess.run([sys.executable, "-m", "murmillo.cli.main", "train", *words], check=False)
+    return done.returncode == 0 and (folder / "measures.json").exists()
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("name", help="of a file in studies/")
+    parser.add_argument("--seeds", type=int, nargs="+", help="instead of the study's own")
+    asked = parser.parse_args()
+    study = read(asked.name)
+    runs = [(variant, seed) for seed in asked.seeds or study.seeds for variant in study.variants]
+    ended = [run(study, variant, seed) for variant, seed in runs]
+    folders = {variant: sorted((RUNS / study.name).glob(f"{variant}-[0-9]*/")) for variant in study.variants}
+    results = collect(study, folders)
+    RESULTS.mkdir(exist_ok=True)
+    file = RESULTS / f"{study.name}.json"
+    file.write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
+    print(f"{file}, {plot(results, file.with_suffix('.png'))}")
+    if not all(ended):
+        sys.exit("some runs have not ended; the same command goes on with them")
+
+
+if __name__ == "__main__":
+    main()
