@@ -61,7 +61,7 @@ def _what(config: Any, versions: dict[str, Any], scalars: Scalars) -> str:
     samples = int(scalars["samples"][-1]) if len(scalars["samples"]) else 0
     minutes = scalars["seconds"][-1] / 60.0 if samples else 0.0
     rate = samples / (60.0 * minutes) if minutes else 0.0
-    chosen = f" ({', '.join(config.clips)})" if config.clips else ""
+    chosen = f" ({', '.join(config.clips)})" if config.get("clips") else ""
     changed = "" if choices.ablation == "none" else f" with the ablation `{choices.ablation}`"
     return (
         f"`{choices.agent}`{changed} learned from the clips `{config.motions}`{chosen} with the budget "
@@ -210,7 +210,7 @@ def _going_on(folder: Path, config: Any, scalars: Scalars) -> str:
     ]
     if config.choices.budget == "smoke":
         clips = "" if config.motions == "builtin" else f" {shlex.quote(f'motions={config.motions}')}"
-        clips += " " + shlex.quote(f"clips=[{','.join(config.clips)}]") if config.clips else ""
+        clips += " " + shlex.quote(f"clips=[{','.join(config.clips)}]") if config.get("clips") else ""
         lines += [
             "# a better fighter, in two hours",
             f"murmillo train agent={config.choices.agent} budget=laptop{clips}",

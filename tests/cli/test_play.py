@@ -97,5 +97,8 @@ def test_from_the_command_to_ctrl_c(own_run: Path, port: int) -> None:
         with urllib.request.urlopen(f"http://127.0.0.1:{port}", timeout=60.0) as answer:
             assert answer.status == 200
         process.send_signal(signal.SIGINT)
-        out, err = process.communicate(timeout=60.0)
+        try:
+            out, err = process.communicate(timeout=60.0)
+        finally:
+            process.kill()
     assert (process.returncode, out, err) == (0, "ended\n", "")
