@@ -46,11 +46,11 @@ def run(words: list[str]) -> int:
     from murmillo.cli import runs, tables
     from murmillo.cli.comparison import curves, page, table
 
-    settings = configuration.parse(CompareConfig, [word for word in words if _is_setting(word)])
+    settings = configuration.parse(CompareConfig, [word for word in words if is_setting(word)])
     out = Path(settings.out or f"comparisons/{time.strftime('%Y-%m-%d_%H-%M-%S')}")
     if any(part.exists() and not part.is_dir() for part in (out, *out.parents)):
         raise CommandError(f"out={out}: this is a file, or lies in one; name a folder")
-    groups, left_out = gather(folders([word for word in words if not _is_setting(word)]))
+    groups, left_out = gather(folders([word for word in words if not is_setting(word)]))
     figures = table.tabulate(groups)
     out.mkdir(parents=True, exist_ok=True)
     runs.write_text(out / _PAGE, page.page(groups, left_out, figures, curves.plot_all(groups, out)))
@@ -62,7 +62,7 @@ def run(words: list[str]) -> int:
     return 0
 
 
-def folders(words: list[str]) -> list[Path]:
+def folders(words: list[str], command: str = "compare") -> list[Path]:
     """Folders of the runs that the words name, each once, in their order.
 
     Raises:
@@ -73,7 +73,7 @@ def folders(words: list[str]) -> list[Path]:
     from murmillo.cli import runs
 
     if not words:
-        raise CommandError("compare needs at least one run: murmillo compare runs/<name> runs/<name>, or 'runs/*'")
+        raise CommandError(f"{command} needs at least one run: murmillo {command} runs/<name> runs/<name>, or 'runs/*'")
     found: dict[Path, Path] = {}
     for word in words:
         if word.startswith("-"):
@@ -106,7 +106,7 @@ def gather(paths: list[Path]) -> tuple[list["Group"], list[tuple[Path, str]]]:
     return groups, left_out + [(one.folder, reason) for one, reason in repeated]
 
 
-def _is_setting(word: str) -> bool:
+def is_setting(word: str) -> bool:
     """Names of runs may have an equals sign too."""
     name, equals, _ = word.partition("=")
     return bool(equals) and name.isidentifier() and not Path(word).exists()

@@ -30,6 +30,11 @@ random latents, in worlds=256 episodes, as a table and in report.md; it takes se
 
   low            the run's own    folder of the low-level run, where it has moved
 
+Of a run of agent=adaptnet: goal reward, episode length and imitation error of the policy before and after training, in
+worlds=256 episodes; it takes seed, motions and
+
+  base           the run's own    of an adaptation: folder of the run that it adapts, where it has moved
+
   murmillo evaluate machine=strike run=runs/<calm> heading=runs/<precision>     a state machine does a task, untrained
 
 Its success rate beside CALM's, time to success and time in each state, and every transition in machines/ of the run's
@@ -62,6 +67,7 @@ def run(words: list[str]) -> int:
     """Measure, print the figures and write the reports."""
     from murmillo.cli import config as configuration
     from murmillo.cli import runs
+    from murmillo.cli.adaptation.words import is_adaptnet_run
     from murmillo.cli.evaluation.bench import Request
     from murmillo.cli.evaluation.evaluating import evaluate
     from murmillo.cli.seeds import check_seed
@@ -71,6 +77,10 @@ def run(words: list[str]) -> int:
         from murmillo.cli.machines.evaluate import run as evaluate_machine
 
         return evaluate_machine(words)
+    if is_adaptnet_run(value_of(words, "run")):
+        from murmillo.cli.adaptation.evaluate import run as evaluate_adaptnet
+
+        return evaluate_adaptnet(words)
     if is_task_run(value_of(words, "run")):
         from murmillo.cli.tasks.evaluate import run as evaluate_task
 

@@ -14,13 +14,14 @@ murmillo: simulated sword-and-shield fighters that learn skills from motion clip
   murmillo compare    put runs side by side:         murmillo compare 'runs/*'
   murmillo record     film a trained agent:          murmillo record run=runs/<name>
   murmillo play       steer it in a browser:         murmillo play run=runs/<name>
+  murmillo map        draw the latents of AdaptNet:  murmillo map runs/<base> runs/<style>
   murmillo motions    import motion clips, look at them, label them
   murmillo doctor     look at this machine: versions, graphics, threads, GPU, speed
 
 `murmillo <command> --help` says what a command takes. Settings are written name=value.
 """
 
-COMMANDS = ("train", "evaluate", "compare", "record", "play", "motions", "doctor")
+COMMANDS = ("train", "evaluate", "compare", "record", "play", "map", "motions", "doctor")
 
 
 def main(argv: list[str] | None = None) -> int:

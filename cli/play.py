@@ -54,9 +54,12 @@ def run(words: list[str]) -> int:
 
     from murmillo.cli import config as configuration
     from murmillo.cli import runs
+    from murmillo.cli.adaptation.words import is_adaptnet_run
     from murmillo.cli.seeds import check_seed
     from murmillo.cli.tasks.words import is_task_run, value_of
 
+    if is_adaptnet_run(named := value_of(words, "run")):
+        raise CommandError(f"run={named}: the page does not steer AdaptNet yet; film it: murmillo record run={named}")
     of_task = is_task_run(value_of(words, "run"))
     settings = configuration.parse(TaskPlayConfig if of_task else PlayConfig, words)
     check_seed("seed", settings.seed)

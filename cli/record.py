@@ -36,6 +36,14 @@ murmillo record: film a trained agent
   out       by machine       file, in the run's folder unless it is a path
   style=walk_forward and the like set the machine's parameters; camera, seed and motions as above
 
+  murmillo record run=runs/<adaptation> alpha=0.5     AdaptNet: half way between the base and its adaptation
+  murmillo record run=runs/<one> with=runs/<other> alpha=0.3      0.3 of the one and 0.7 of the other of the same base
+
+  alpha     all of it        how much of the adaptation acts, 0 to 1; of two 0.5
+  with      none             folder of another adaptation of the same base
+  base      the run's own    folder of the run that it adapts, where it has moved
+  seconds, camera, out, seed and motions as above
+
 A run that learned a task is shown with its goals; it follows no clips.
 Works without a screen, through EGL or OSMesa; `murmillo doctor` says whether this machine has one of them.
 """
@@ -90,14 +98,22 @@ class _Film(NamedTuple):
 
 
 def _plan(words: list[str]) -> _Film:
-    """A machine, a run that has learned a task, or one that has learned from clips."""
+    """A machine, a run of AdaptNet, one that has learned a task, or one that has learned from clips."""
     from murmillo.cli import config as configuration
+    from murmillo.cli.adaptation.words import is_adaptnet_run
     from murmillo.cli.tasks.words import is_task_run, value_of
 
     if value_of(words, "machine") is not None:
         from murmillo.cli.machines import record as machines
 
         return _Film(*machines.plan(words))
+    if is_adaptnet_run(value_of(words, "run")):
+        from murmillo.cli.adaptation import record as adaptnet
+
+        shown = adaptnet.parse(words)
+        return _Film(
+            shown.run, shown.seconds, shown.out, shown.seed, lambda folder, out: adaptnet.film(folder, shown, out)
+        )
     if is_task_run(value_of(words, "run")):
         from murmillo.cli.tasks import record as tasks
 

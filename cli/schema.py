@@ -46,9 +46,16 @@ class _Default:
         return MISSING if self.field.default is dataclasses.MISSING else _schema_value(self.field.default, self.hint)
 
 
+class _Choice(Enum):
+    """A value of a `Literal`; other settings may be put together from it."""
+
+    def __str__(self) -> str:
+        return self.value
+
+
 @cache
 def _enumeration(values: tuple[str, ...]) -> type[Enum]:
-    return Enum("Choice", {value: value for value in values})  # type: ignore[return-value]
+    return _Choice("Choice", {value: value for value in values})  # type: ignore[return-value]
 
 
 def _schema_type(hint: Any) -> Any:

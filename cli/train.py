@@ -1,5 +1,9 @@
 """`murmillo train`: one run, or with --multirun one for each combination of settings."""
 
+from collections.abc import Callable
+from typing import Any
+
+from murmillo.cli.adaptation.words import are_about_adaptnet
 from murmillo.cli.errors import CommandError
 from murmillo.cli.tasks.words import are_about_a_task
 
@@ -14,10 +18,12 @@ murmillo train: train an agent on motion clips
   murmillo train --multirun seed=1,2,3               one run for each value
   murmillo train task=location low=runs/<name>       a task, by the skills of a trained agent
   murmillo train task=location low=none              the same task without an agent below
+  murmillo train agent=adaptnet                      a humanoid that walks to places, the base of adaptations
+  murmillo train agent=adaptnet stage=adapt base=runs/<name> to=style clips=[jaunty]
 
 Settings are written name=value. The first ones:
 
-  agent      ase, case or calm                       the method
+  agent      ase, case, calm or adaptnet             the method
   motions    builtin, a folder or a file             what it learns from
   budget     smoke (10 minutes), laptop (2 hours), paper (as published)
   ablation   none, no_skill_discovery, no_diversity, neither, no_focal, no_masking, residual
@@ -40,6 +46,15 @@ With task=… a high-level policy learns to choose what the agent of another run
   budget     smoke (10 minutes), laptop (2 hours), paper
   run.video, run.name, run.root, run.resume, seed, num_envs, threads: as above
 
+With agent=adaptnet a policy learns to go to places in the style of the clips, and is then adapted (docs/adaptnet.md):
+
+  stage      base or adapt                           a policy from nothing, or an adaptation of base=runs/<name>
+  to         style, body, lock, friction, terrain, obstacles or pushes
+  method     adaptnet, scratch, finetune, finetune_regularised or progressive
+  ablation   none, injection_z1, injection_z2, injection_all, latent_only, no_own_encoder, internal_only, lora
+  task.gait  walk or run
+  motions, clips, budget, seed, num_envs, threads, run.name and the like: as above
+
 `config.yaml` in the folder of a run shows every setting; each can be given here by its dotted name, such as
 agent.ppo.std=0.05 or runner.max_minutes=30. Ctrl-C ends a run after the iteration under way, with a checkpoint.
 """
@@ -52,6 +67,8 @@ def run(words: list[str]) -> int:
     for flag in flags:
         if flag not in ("--multirun", "-m"):
             raise CommandError(f"{flag}: there is no such option; known are --multirun and --help")
+    if are_about_adaptnet(settings):
+        return _train_adaptnet(settings, multirun=bool(flags))
     if are_about_a_task(settings):
         return _train_task(settings, multirun=bool(flags))
     settings = [word for word in settings if not word.startswith("task=")]
@@ -70,11 +87,23 @@ def _train_task(words: list[str], multirun: bool) -> int:
     from murmillo.cli.tasks.config import compose_task
     from murmillo.cli.tasks.training import train
 
+    return _train_all(compose_task, train, words, multirun)
+
+
+def _train_adaptnet(words: list[str], multirun: bool) -> int:
+    """One base or adaptation, or one after the other for each combination of values."""
+    from murmillo.cli.adaptation.config import compose_adaptnet
+    from murmillo.cli.adaptation.training import train
+
+    return _train_all(compose_adaptnet, train, words, multirun)
+
+
+def _train_all(compose: Callable[[list[str]], Any], train: Callable[..., int], words: list[str], multirun: bool) -> int:
     if not multirun:
-        return train(compose_task(words))
+        return train(compose(words))
     from murmillo.cli.sweep import combinations
 
-    configs = [compose_task(list(combination)) for combination in combinations(words)]  # a mistake shows before any run
+    configs = [compose(list(combination)) for combination in combinations(words)]  # a mistake shows before any run
     for number, config in enumerate(configs):
         train(config, suffix=f"-{number}")
     return 0

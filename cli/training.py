@@ -6,7 +6,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -30,6 +30,7 @@ from murmillo.cli.evaluation.evaluating import evaluate
 from murmillo.cli.evaluation.identity import clip_digests
 from murmillo.cli.evaluation.kept import Keeper
 from murmillo.cli.evaluation.table import QUICK
+from murmillo.cli.metrics import TRAINING, Metric
 from murmillo.cli.progress import Progress, make_progress
 from murmillo.envs import HumanoidVectorEnv
 from murmillo.envs.motion.licences import terms_of
@@ -103,29 +104,59 @@ def _train(config: TrainConfig, env: HumanoidVectorEnv, folder: Path, resuming: 
     runner.meta |= {"terms": terms}  # after loading: they are kept with a checkpoint, and need not be those here
     runs.write_json(folder / runs.TERMS, terms)
     runs.write_json(folder / runs.CLIPS, clip_digests(env.library.clips))
-    progress = make_progress(config.runner.samples, runner.samples, config.runner.max_minutes)
-    with progress, stopping(runner.stop, progress) as stopped:
-        progress.say(f"{folder}: {config.choices['agent']} on {len(env.library.clips)} clips, {config.num_envs} worlds")
+    opening = f"{folder}: {config.choices['agent']} on {len(env.library.clips)} clips, {config.num_envs} worlds"
+    keep = () if config.run.keep_every is None else (Keeper(runner, agent, config.run.keep_every, folder),)
+
+    def begin(progress: Progress) -> None:
         if not resuming:
             _warm_start(config, agent, env, generator, progress, folder)
-        begun = time.monotonic()
-        runner.on_iteration = [
-            lambda scalars: progress.show(int(scalars["samples"]), time.monotonic() - begun, scalars)
-        ]
-        if config.run.keep_every is not None:
-            runner.on_iteration.append(Keeper(runner, agent, config.run.keep_every, folder))
-        runner.on_warning = [lambda text: progress.say(f"warning: {text}")]
-        runner.run()
+
+    stopped = follow(runner, folder, opening, begin=begin, on_iteration=keep)
     _keep_skills(agent, env, folder)
-    runs.write_json(folder / runs.NOTICES, [dataclasses.asdict(notice) for notice in runner.watch.notices])
-    logger.close()
-    if stopped():
+    if stopped:
         (folder / runs.MEASURES).unlink(missing_ok=True)  # of this run when it had ended before: no longer its figures
         report.write(folder)
         print(f"stopped at {runner.samples:,} samples; go on with: murmillo train run.resume={folder}")
         return 0
     _finish(config, folder)
     return 0
+
+
+def follow(
+    runner: Runner,
+    folder: Path,
+    opening: str,
+    *,
+    metrics: tuple[Metric, ...] = TRAINING,
+    begin: Callable[[Progress], None] = lambda progress: None,
+    on_iteration: Sequence[Callable[[dict[str, float]], None]] = (),
+) -> bool:
+    """Run it to its end, or to a signal's, under a display of its progress; whether a signal ended it.
+
+    Args:
+        runner: its notices are kept in the run's `folder`, its logger is closed.
+        folder: of the run.
+        opening: the first line.
+        metrics: that are shown.
+        begin: called before the first iteration.
+        on_iteration: called with every iteration's statistics.
+    """
+    limits = runner.config
+    progress = make_progress(limits.samples, runner.samples, limits.max_minutes, metrics)
+    with progress, stopping(runner.stop, progress) as stopped:
+        progress.say(opening)
+        begin(progress)
+        begun = time.monotonic()
+        runner.on_iteration = [
+            lambda scalars: progress.show(int(scalars["samples"]), time.monotonic() - begun, scalars),
+            *on_iteration,
+        ]
+        runner.on_warning = [lambda text: progress.say(f"warning: {text}")]
+        runner.run()
+    runs.write_json(folder / runs.NOTICES, [dataclasses.asdict(notice) for notice in runner.watch.notices])
+    if runner.logger is not None:
+        runner.logger.close()
+    return stopped()
 
 
 def _keep_skills(agent: Any, env: HumanoidVectorEnv, folder: Path) -> None:

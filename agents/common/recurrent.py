@@ -22,7 +22,8 @@ class LastOutput(nn.Module):
 
         All are valid without a length. What is behind the valid frames has no influence, gradients included.
         """
-        outputs, _ = self.gru(frames.flatten(0, -3))
+        # how the GRU rounds depends on the strides, and a frozen copy sees a part of a larger tensor
+        outputs, _ = self.gru(frames.flatten(0, -3).contiguous())
         if length is None:
             last = outputs[:, -1]
         else:

@@ -4,10 +4,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import torch
-from torch import Tensor
 from torch.nn import functional as F
 
 from murmillo.agents.common.interface import ImitationPairs
+from murmillo.agents.common.networks import Told
 from murmillo.agents.common.ppo import ActorCritic
 from murmillo.agents.common.training import adam
 
@@ -36,7 +36,7 @@ def warm_start(
     pairs: ImitationPairs,
     config: WarmStartConfig,
     generator: torch.Generator,
-    condition: Callable[[int], Tensor | None] = lambda n: None,
+    condition: Callable[[int], Told] = lambda n: None,
 ) -> list[float]:
     """Minimise E ||mu(s, c) - a||^2 / A over (s, a) of the clips and random conditions; the critic stays as it is.
 
@@ -47,7 +47,7 @@ def warm_start(
         pairs: draws states and the actions that lead on along the clip.
         config: how long and how fast.
         generator: draws pairs.
-        condition: draws n random conditions `[n, C]`.
+        condition: draws what the policy is told of n states at random: conditions `[n, C]`, or named tensors.
 
     Returns:
         the loss of every step.
@@ -61,7 +61,7 @@ def warm_start(
     losses: list[float] = []
     for step in range(config.steps):
         rows = torch.randint(config.pairs, (config.minibatch,), generator=generator)
-        mean = model.policy(state[rows], conditions[step % _CONDITIONS])
+        mean = model.policy.mode(model.policy(state[rows], conditions[step % _CONDITIONS]))
         loss = F.mse_loss(mean, action[rows])
         optimizer.zero_grad()
         loss.backward()

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
+from murmillo.cli.adaptation.metrics import IMITATION
 from murmillo.cli.comparison.grouping import Group
 from murmillo.cli.comparison.record import Run
 from murmillo.cli.comparison.statistics import bootstrap_interval
@@ -15,6 +16,8 @@ _COVERAGES = (
     Metric("coverage", "Coverage", "share", 3, "of the clips"),
     Metric("coverage_10", "Coverage, filtered at 10 %", "share", 3, "of the clips"),
 )
+_WITH_A_TASK = {"choices.task", "choices.stage"}
+"""Settings that only runs of a task have, and those of AdaptNet, which all learn one."""
 _POINTS = 200
 _RESAMPLES = 1000
 _AXES = {"samples": ("samples [million]", 1e6), "seconds": ("training time [h]", 3600.0)}
@@ -23,10 +26,10 @@ _AXES = {"samples": ("samples [million]", 1e6), "seconds": ("training time [h]",
 def plot_all(groups: list[Group], folder: Path) -> list[Path]:
     """One PNG a metric, against samples and against hours, of those that a group has a curve of; their paths."""
     paths = []
-    for metric in (TASK, SIMILARITY, STYLE, EPISODE_LENGTH, *_COVERAGES):
+    for metric in (TASK, SIMILARITY, IMITATION, STYLE, EPISODE_LENGTH, *_COVERAGES):
         shown = [one for one in groups if all(_points(run, metric.scalar) > 1 for run in one.runs)]
         if metric is TASK:  # every run logs one, and without a task it is 0
-            shown = [one for one in shown if "choices.task" in one.settings]
+            shown = [one for one in shown if one.settings.keys() & _WITH_A_TASK]
         if shown:
             paths.append(_plot(shown, groups, metric, folder / f"{metric.scalar.replace('/', '_')}.png"))
     return paths

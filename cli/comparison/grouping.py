@@ -22,7 +22,15 @@ _IDLE = (
 """Settings that change nothing in what is learned from how much."""
 _REPEATED = ("env.motions", "env.window")
 """Settings that follow from others."""
-_FOREMOST = ("choices.task", "choices.agent", "choices.ablation", "motions", "choices.budget")
+_FOREMOST = (
+    "choices.task",
+    "choices.agent",
+    "choices.to",
+    "choices.method",
+    "choices.ablation",
+    "motions",
+    "choices.budget",
+)
 """Settings that a label takes before all others."""
 _SHARED_NETWORKS = ("agent.ppo.hidden", "agent.discriminator.hidden")
 """Networks that every method has; its further ones belong to the method."""

@@ -68,6 +68,8 @@ _MEASURES = {
         NORMALISED_RETURN,
         Quantity(TRAINED, "reach_error", "Distance of the sword's tip from the target", "m", "down"),
         Quantity(TRAINED, "heading_cosine", "Cosine of movement and its direction", "", "up"),
+        Quantity(TRAINED, "goal_reward", "Goal reward", "", "up"),
+        Quantity(TRAINED, "imitation_error", "Imitation error", "m", "down"),
         Quantity(TRAINED, "style_success", "Share of steps in the commanded style", "", "up"),
         Quantity(TRAINED, "early_rate", "Share of episodes that ended early", "", "down"),
     )

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from murmillo.agents.common.checkpoint import META, TENSORS
 from murmillo.agents.common.errors import AgentError
 from murmillo.cli import config as configuration
-from murmillo.cli import runs
+from murmillo.cli import foundations, runs
+from murmillo.cli.adaptation.words import is_adaptnet_run
 from murmillo.cli.agents import load_player
 from murmillo.cli.config import TrainConfig
 from murmillo.cli.errors import CommandError
@@ -20,8 +20,7 @@ NONE = "none"
 SCRATCH = "scratch"
 """What ASE calls such a policy, and its name among the agents."""
 
-_PATH, _DIGEST = "low", "low_digest"
-"""Where a checkpoint keeps which policy it was trained over."""
+_SETTING = "low"
 _ITS_OWN = ("character", "window", "residual_force", "residual_reward")
 """Settings of the environment that its policy and its discriminator were made for."""
 
@@ -74,7 +73,7 @@ class LowRun:
             raise CommandError(f"low={self.word}: {error}") from None
 
 
-def find(word: str, setting: str = "low") -> LowRun | None:
+def find(word: str, setting: str = _SETTING) -> LowRun | None:
     """The run that `low=word` names, or another setting that wants such a run; None for `none`.
 
     Raises:
@@ -82,19 +81,14 @@ def find(word: str, setting: str = "low") -> LowRun | None:
     """
     if word == NONE:
         return None
-    folder = runs.existing(word, setting)
-    if is_task_run(word):
+    if is_task_run(word) or is_adaptnet_run(word):
         raise CommandError(f"{setting}={word}: this run has learned a task itself; name a run of ase, calm or case")
-    if not all((folder / runs.LAST / name).is_file() for name in (META, TENSORS)):
-        raise CommandError(
-            f"{setting}={word}: this run has no checkpoint; train it first: murmillo train run.resume={word}"
-        )
-    return LowRun(word, folder, configuration.load(folder))
+    return LowRun(word, foundations.trained_run(word, setting), configuration.load(Path(word)))
 
 
 def identity(below: LowRun | None) -> dict[str, str]:
     """What a checkpoint keeps of the policy that it was trained over: where it was, and its digest."""
-    return {} if below is None else {_PATH: str(below.folder), _DIGEST: below.digest()}
+    return foundations.identity(_SETTING, below and below.folder)
 
 
 def check_unchanged(below: LowRun | None, saved: dict[str, Any]) -> None:
@@ -107,14 +101,4 @@ def check_unchanged(below: LowRun | None, saved: dict[str, Any]) -> None:
     Raises:
         CommandError: their digests differ.
     """
-    digest, here = (known.get(_DIGEST) for known in (saved.get("meta", {}), identity(below)))
-    if here != digest:
-        word = NONE if below is None else below.word
-        raise CommandError(
-            f"low={word}: its checkpoint is not the one that this policy was trained over (SHA-256 {_short(digest)} "
-            f"then, {_short(here)} now); name a copy of that one with low=…, or train a new policy"
-        )
-
-
-def _short(digest: str | None) -> str:
-    return NONE if digest is None else digest[:12]
+    foundations.check_unchanged(_SETTING, NONE if below is None else below.word, below and below.folder, saved)

@@ -52,7 +52,7 @@ def measure(
         config = dataclasses.replace(config, task=dataclasses.replace(config.task, skill_steps=0))
     world = World(config, below, worlds)
     try:
-        recorder = _Recorder(world.env, StyleSuccess(world.env) if config.commands_styles else None)
+        recorder = Recorder(world.env, StyleSuccess(world.env) if config.commands_styles else None)
         world.observe(recorder)
         measured = Measured({}, {})
         for name, player in make_players(config, world, checkpoint).items():
@@ -63,7 +63,7 @@ def measure(
 
 
 @torch.no_grad()
-def _play(world: World, player: Player, recorder: "_Recorder", seed: int) -> tuple[Figures, dict[str, Figures]]:
+def _play(world: World, player: Player, recorder: "Recorder", seed: int) -> tuple[Figures, dict[str, Figures]]:
     """Figures of all episodes, and of those of each commanded style."""
     obs, _ = world.decisions.reset(seed=seed)
     recorder.begin(obs)
@@ -72,10 +72,11 @@ def _play(world: World, player: Player, recorder: "_Recorder", seed: int) -> tup
     return recorder.figures(), recorder.figures_by_style()
 
 
-class _Recorder:
-    """Keeps the first episode of each world, control step by control step."""
+class Recorder:
+    """Keeps the first episode of each world, control step by control step: `begin`, then a call after each."""
 
-    def __init__(self, env: HumanoidVectorEnv, style: StyleSuccess | None) -> None:
+    def __init__(self, env: HumanoidVectorEnv, style: StyleSuccess | None = None) -> None:
+        """`style` is asked too, where one is commanded."""
         self._env, self._style = env, style
         self._own = next((own for kind, own in _OWN.items() if isinstance(env.task, kind)), None)
 
@@ -93,9 +94,14 @@ class _Recorder:
             self._style.begin(obs)
 
     @property
+    def lasting(self) -> Tensor:
+        """`[N]` bool: the worlds whose first episode still lasts."""
+        return self._alive[-1]
+
+    @property
     def going(self) -> bool:
         """Whether an episode still lasts."""
-        return bool(self._alive[-1].any())
+        return bool(self.lasting.any())
 
     def __call__(self, action: Tensor, results: Any) -> None:
         _, reward, terminated, truncated, infos = results

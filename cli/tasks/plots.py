@@ -4,21 +4,21 @@ from pathlib import Path
 
 import numpy as np
 
-from murmillo.cli.metrics import STYLE
+from murmillo.cli.metrics import STYLE, Metric
 from murmillo.cli.plots import Scalars, smooth
 from murmillo.cli.tasks.metrics import SIMILARITY, TASK
 
 
-def plot_learning(scalars: Scalars, steps: int, folder: Path) -> Path:
-    """The task's reward, and the side rewards that there are, against control steps; `steps` make a sample."""
+def plot_learning(
+    scalars: Scalars, steps: int, folder: Path, metrics: tuple[Metric, ...] = (TASK, SIMILARITY, STYLE)
+) -> Path:
+    """Those of the metrics that there are against control steps; `steps` make a sample."""
     # the object interface: pyplot would open the user's screen back end
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     folder.mkdir(exist_ok=True)
-    shown = [
-        metric for metric in (TASK, SIMILARITY, STYLE) if np.isfinite(scalars.get(metric.scalar, np.array([]))).any()
-    ]
+    shown = [metric for metric in metrics if np.isfinite(scalars.get(metric.scalar, np.array([]))).any()]
     figure = Figure(figsize=(6.4, 3.2 * len(shown)), dpi=120, layout="constrained")
     FigureCanvasAgg(figure)
     for place, metric in enumerate(shown, start=1):

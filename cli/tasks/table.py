@@ -13,6 +13,8 @@ _KINDS = {
         FigureKind("normalised_return", "Normalised return", "", 3, "up"),
         FigureKind("reach_error", "Distance of the sword's tip from the target", "m", 3, "down"),
         FigureKind("heading_cosine", "Cosine of movement and its direction", "", 3, "up"),
+        FigureKind("goal_reward", "Goal reward", "", 3, "up"),
+        FigureKind("imitation_error", "Imitation error", "m", 3, "down"),
         FigureKind("style_success", "Steps in the commanded style", "%", 1, "up"),
         FigureKind("length", "Episode length", "steps", 1, "up"),
         FigureKind("fall_rate", "Fall rate", "%", 1, "down"),
@@ -25,6 +27,11 @@ MEANINGS = {
     "reach_error": "over all control steps, the way there included. ASE reports 0.088 ± 0.046 m (section 10.2).",
     "heading_cosine": "1 is straight where it was told to move, -1 straight away, 0 for standing still. CALM reports "
     "0.91 to 0.92 (table 2).",
+    "goal_reward": "the task's reward of a control step, 0 to 1, mean over the steps until an episode's end: what "
+    "AdaptNet's learning curves show.",
+    "imitation_error": "mean distance of the links, relative to the root and its heading, from the nearest clip "
+    "(AdaptNet, eq. 15): the motion is cut into pieces as long as the clip, which is taken for a cycle, and time is "
+    "warped; half a second at least. ± is the deviation of single pieces.",
     "style_success": "share of the control steps that lie nearest, of all clips (ASE, eq. 22), to one of the commanded "
     "skill, which holds for an episode. CALM asked human raters instead, who saw running in 100 %, walking in 81 % and "
     "walking crouched in 94 % (table 2): no figures to set beside this one.",
@@ -93,6 +100,15 @@ def entries(measured: dict[str, dict[str, Value]], style: str | None = None) -> 
         for name, kind in _KINDS.items()
         if any(name in found for found in measured.values())
     }
+
+
+def by_player(results: dict[str, Any]) -> dict[str, dict[str, float]]:
+    """Figures by player and name, and how many episodes they are of, as `measures.json` has them."""
+    measures: dict[str, dict[str, float]] = {}
+    for name, figure in _figures(results).items():
+        for player, value in figure["values"].items():
+            measures.setdefault(player, {"episodes": results["trajectories"]})[name] = value["value"]
+    return measures
 
 
 def published(task: str) -> str:

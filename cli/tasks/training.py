@@ -1,7 +1,6 @@
 """One run of a task from its settings to its report: build, train, measure, film, report."""
 
 import dataclasses
-import time
 from pathlib import Path
 from typing import Any
 
@@ -12,15 +11,14 @@ from murmillo.agents.common.logger import Logger
 from murmillo.agents.common.runner import Runner
 from murmillo.cli import runs, versions
 from murmillo.cli.evaluation.identity import clip_digests
-from murmillo.cli.progress import make_progress
-from murmillo.cli.tasks import low, report
+from murmillo.cli.tasks import low, report, table
 from murmillo.cli.tasks.checks import check_settings
 from murmillo.cli.tasks.config import TaskTrainConfig
 from murmillo.cli.tasks.evaluating import evaluate
 from murmillo.cli.tasks.low import LowRun
 from murmillo.cli.tasks.metrics import training_metrics
 from murmillo.cli.tasks.world import World, make_policy, policy_meta
-from murmillo.cli.training import describe, film, stopping, undone_by_mistakes
+from murmillo.cli.training import describe, film, follow, undone_by_mistakes
 from murmillo.envs.motion.licences import terms_of
 
 
@@ -65,20 +63,9 @@ def _train(config: TaskTrainConfig, below: LowRun | None, world: World, folder: 
     runner.meta |= {"terms": terms, **low.identity(below)}
     runs.write_json(folder / runs.TERMS, terms)
     runs.write_json(folder / runs.CLIPS, clip_digests(world.env.library.clips))
-    metrics = training_metrics(config.latent_env.steps)
-    progress = make_progress(config.runner.samples, runner.samples, config.runner.max_minutes, metrics)
-    with progress, stopping(runner.stop, progress) as stopped:
-        over = "on its own" if below is None else f"over {below.word} ({below.kind})"
-        progress.say(f"{folder}: {config.choices['task']} {over}, {config.num_envs} worlds")
-        begun = time.monotonic()
-        runner.on_iteration = [
-            lambda scalars: progress.show(int(scalars["samples"]), time.monotonic() - begun, scalars)
-        ]
-        runner.on_warning = [lambda text: progress.say(f"warning: {text}")]
-        runner.run()
-    runs.write_json(folder / runs.NOTICES, [dataclasses.asdict(notice) for notice in runner.watch.notices])
-    logger.close()
-    if stopped():
+    over = "on its own" if below is None else f"over {below.word} ({below.kind})"
+    opening = f"{folder}: {config.choices['task']} {over}, {config.num_envs} worlds"
+    if follow(runner, folder, opening, metrics=training_metrics(config.latent_env.steps)):
         for name in (runs.MEASURES, runs.METRICS):  # of this run when it had ended before: no longer its figures
             (folder / name).unlink(missing_ok=True)
         report.write(folder)
@@ -92,16 +79,7 @@ def _finish(config: TaskTrainConfig, below: LowRun | None, folder: Path) -> None
     """Measure the policy beside what it is to be better than, film it, write the report."""
     print("measuring the policy before and after training", flush=True)
     results: dict[str, Any] = evaluate(config, below, folder, config.run.measured_worlds)
-    runs.write_json(folder / runs.MEASURES, _flat(results))
+    runs.write_json(folder / runs.MEASURES, table.by_player(results))
     if config.run.video:
         film(folder)
     print(f"the report: {report.write(folder)}")
-
-
-def _flat(results: dict[str, Any]) -> dict[str, dict[str, float]]:
-    """Figures by player and name, and how many episodes they are of."""
-    measures: dict[str, dict[str, float]] = {}
-    for name, figure in results["metrics"]["task"]["figures"].items():
-        for player, value in figure["values"].items():
-            measures.setdefault(player, {"episodes": results["trajectories"]})[name] = value["value"]
-    return measures

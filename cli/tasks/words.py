@@ -25,6 +25,11 @@ def are_about_a_task(words: Sequence[str]) -> bool:
 
 def is_task_run(folder: str | None) -> bool:
     """Whether a run has learned a task; False where there is none, or none that can be read."""
+    return "task" in choices_of(folder)
+
+
+def choices_of(folder: str | None) -> dict[str, str]:
+    """What a run's settings were put together from; nothing where there is no run, or none that can be read."""
     import yaml
 
     path = os.path.join(folder or "", CONFIG)
@@ -32,6 +37,6 @@ def is_task_run(folder: str | None) -> bool:
         with open(path, encoding="utf-8") as file:
             settings = yaml.safe_load(file)
     except (OSError, ValueError, yaml.YAMLError):
-        return False
+        return {}
     choices = settings.get("choices") if isinstance(settings, dict) else None
-    return isinstance(choices, dict) and "task" in choices
+    return choices if isinstance(choices, dict) else {}

@@ -1,0 +1,101 @@
+"""The run whose policy is adapted: found, checked, and known again by its checkpoint."""
+
+from dataclasses import dataclass
+from operator import attrgetter
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from murmillo.agents.adaptnet.base import Base
+from murmillo.agents.adaptnet.config import AdaptNetConfig
+from murmillo.agents.common.errors import AgentError
+from murmillo.cli import foundations, runs
+from murmillo.cli.adaptation.words import AGENT, is_adaptnet_run
+from murmillo.cli.errors import CommandError
+from murmillo.cli.tasks.words import choices_of
+from murmillo.envs import EnvConfig
+from murmillo.envs.character import Character
+
+if TYPE_CHECKING:
+    from murmillo.cli.adaptation.config import AdaptNetTrainConfig
+
+SETTING = "base"
+_SIZES = ("recurrent", "ppo.hidden")
+"""Settings of the agent that its policy was made with."""
+
+
+@dataclass(frozen=True)
+class BaseRun:
+    """A run of `stage=base`.
+
+    Attributes:
+        word: as the user named it.
+        folder: of the run.
+        config: its settings.
+    """
+
+    word: str
+    folder: Path
+    config: "AdaptNetTrainConfig"
+
+    def check_env(self, env: EnvConfig) -> None:
+        """Refuse another character; its body may be another one.
+
+        Raises:
+            CommandError: naming the setting.
+        """
+        if env.character != (own := self.config.env.character):
+            raise CommandError(
+                f"env.character={env.character}: the policy of base={self.word} was trained with {own}; "
+                "drop env.character, or name another run"
+            )
+
+    def sizes(self) -> list[str]:
+        """Its policy's sizes as words `name=value`, since an adaptation has the same."""
+        return [f"agent.{name}={_listed(attrgetter(name)(self.config.agent))}" for name in _SIZES]
+
+    def check_sizes(self, agent: AdaptNetConfig) -> None:
+        """Refuse a policy of another size.
+
+        Raises:
+            CommandError: naming the setting.
+        """
+        for name in _SIZES:
+            if (value := attrgetter(name)(agent)) != (own := attrgetter(name)(self.config.agent)):
+                raise CommandError(
+                    f"agent.{name}={_listed(value)}: the policy of base={self.word} has {_listed(own)}; "
+                    f"drop agent.{name}, or name another run"
+                )
+
+    def weights(self, character: Character) -> Base:
+        """Its policy, without the outputs for joints that the character has not.
+
+        Raises:
+            CommandError: its checkpoint is damaged.
+        """
+        try:
+            base = Base.load(self.folder / runs.LAST)
+        except AgentError as error:
+            raise CommandError(f"base={self.word}: {error}") from None
+        kept = [output for output in range(character.base.action_dim) if output not in character.pruned]
+        return base.pruned(kept) if character.pruned else base
+
+
+def find(word: str) -> BaseRun:
+    """The run that `base=word` names.
+
+    Raises:
+        CommandError: there is no such run, it has no checkpoint, or it is no base.
+    """
+    from murmillo.cli.adaptation.config import load  # whose settings know what a base is
+
+    folder = runs.existing(word, SETTING)
+    if not is_adaptnet_run(word):
+        raise CommandError(f"base={word}: this is no run of agent={AGENT}; name one of agent={AGENT} stage=base")
+    if choices_of(word).get("stage") != "base":
+        raise CommandError(f"base={word}: this run adapts a policy itself; name the run of stage=base that it adapts")
+    return BaseRun(word, foundations.trained_run(word, SETTING), load(folder))
+
+
+def _listed(value: Any) -> str:
+    """As on the command line."""
+    return f"[{','.join(map(str, value))}]" if isinstance(value, tuple) else str(value)

@@ -1,0 +1,51 @@
+"""The figures of a run of AdaptNet, in `evaluation/metrics.json`, where `murmillo compare` reads them."""
+
+from pathlib import Path
+from typing import Any
+
+from murmillo.agents.common import checkpoint
+from murmillo.cli import runs
+from murmillo.cli.adaptation.base import BaseRun
+from murmillo.cli.adaptation.config import AdaptNetTrainConfig
+from murmillo.cli.adaptation.measuring import measure
+from murmillo.cli.adaptation.world import check_base
+from murmillo.cli.evaluation.identity import checkpoint_digest
+from murmillo.cli.tasks import table
+from murmillo.cli.tasks.evaluating import SEED
+
+
+def evaluate(
+    config: AdaptNetTrainConfig, base: BaseRun | None, folder: Path, worlds: int, seed: int = SEED
+) -> dict[str, Any]:
+    """Measure the run in `folder` in so many episodes and keep what was found.
+
+    Returns:
+        What `evaluation/metrics.json` has.
+
+    Raises:
+        AgentError: there is no checkpoint, or it does not fit.
+        CommandError, SuiteError: the base has changed, or the environment cannot be made.
+    """
+    saved = checkpoint.load(folder / runs.LAST)
+    check_base(base, saved)
+    results = {
+        "run": folder.name,
+        "task": "navigate",
+        "agent": config.choices["agent"],
+        "samples": int(saved.get("samples", 0)),
+        "checkpoint": checkpoint_digest(folder / runs.LAST),
+        "trajectories": worlds,
+        "seed": seed,
+        "start": "as in training",
+        "not_comparable": None,
+        "metrics": {
+            "task": {
+                "title": "Goal and style",
+                "protocols": ["one episode a world, mean actions"],
+                "figures": table.entries(measure(config, base, folder, worlds, seed)),
+            }
+        },
+    }
+    (folder / runs.EVALUATION).mkdir(exist_ok=True)
+    runs.write_json(folder / runs.METRICS, results)
+    return results

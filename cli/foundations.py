@@ -1,0 +1,57 @@
+"""A run that another one is built on: found, and known again by its checkpoint."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from murmillo.agents.common.checkpoint import META, TENSORS
+from murmillo.cli import runs
+from murmillo.cli.errors import CommandError
+from murmillo.cli.evaluation.identity import checkpoint_digest
+
+_ABSENT = "none"
+
+
+def trained_run(word: str, setting: str) -> Path:
+    """The folder of the run that a setting names.
+
+    Raises:
+        CommandError: there is no such run, or it has no checkpoint.
+    """
+    folder = runs.existing(word, setting)
+    if not all((folder / runs.LAST / name).is_file() for name in (META, TENSORS)):
+        raise CommandError(
+            f"{setting}={word}: this run has no checkpoint; train it first: murmillo train run.resume={word}"
+        )
+    return folder
+
+
+def identity(setting: str, folder: Path | None) -> dict[str, str]:
+    """What a checkpoint keeps of the run that it was built on: where it was, and its digest."""
+    if folder is None:
+        return {}
+    return {setting: str(folder), f"{setting}_digest": checkpoint_digest(folder / runs.LAST)}
+
+
+def check_unchanged(setting: str, word: str, folder: Path | None, saved: Mapping[str, Any]) -> None:
+    """Refuse another run than the one that a checkpoint was built on.
+
+    Args:
+        setting: that names the run, by `word`.
+        folder: of what it names now.
+        saved: content of the checkpoint.
+
+    Raises:
+        CommandError: their digests differ.
+    """
+    known = (saved.get("meta", {}), identity(setting, folder))
+    then, now = (found.get(f"{setting}_digest") for found in known)
+    if now != then:
+        raise CommandError(
+            f"{setting}={word}: its checkpoint is not the one that this policy was trained over (SHA-256 "
+            f"{_short(then)} then, {_short(now)} now); name a copy of that one with {setting}=…, or train a new policy"
+        )
+
+
+def _short(digest: str | None) -> str:
+    return _ABSENT if digest is None else digest[:12]
