@@ -13,7 +13,7 @@ from yaml import YAMLError
 from murmillo.cli import runs
 from murmillo.cli.errors import CommandError
 from murmillo.cli.evaluation import history, sources
-from murmillo.cli.metrics import TRAINING
+from murmillo.cli.metrics import EPISODE_LENGTH, TRAINING
 from murmillo.cli.plots import Scalars
 from murmillo.cli.report import read_scalars
 
@@ -144,7 +144,8 @@ def read(folder: Path) -> Run | None:
     with _reading(folder / runs.VERSIONS) as path:
         versions = dict(runs.read_json(path, {}))
     # a decision of a high-level policy counts as the control steps that it takes, which all runs have in common
-    scalars["samples"] = settings.get("latent_env.steps", 1) * scalars["samples"]
+    for counted in {"samples", EPISODE_LENGTH.scalar} & scalars.keys():
+        scalars[counted] = settings.get("latent_env.steps", 1) * scalars[counted]
     run = Run(folder, settings, scalars, coverages, figures, clips, versions)
     figures |= _logged(run)
     return run
