@@ -12,6 +12,7 @@ from murmillo.cli.plots import Scalars
 from murmillo.cli.tasks import plots, table
 from murmillo.cli.tasks.low import NONE
 from murmillo.cli.tasks.metrics import training_metrics
+from murmillo.cli.tasks.verdict import verdict
 
 
 def write(folder: Path) -> Path:
@@ -74,6 +75,7 @@ def _figures(config: Any, results: dict[str, Any] | None) -> str:
             f"{results['trajectories']:,} episodes for each, begun as `env.starts` says, with mean actions, after "
             f"{results['samples']:,} samples, seed {results['seed']}.{styles}{random}",
             table.markdown(results),
+            verdict(results, config.env.episode_steps),
             table.styles_markdown(results),
             table.meanings(results),
             table.published(results["task"]),
