@@ -5,6 +5,7 @@ import os
 import sys
 
 from murmillo.cli.errors import CommandError, near_names, user_errors
+from murmillo.cli.interrupts import BROKEN_OFF, STATUS, interruptible
 
 HELP = """\
 murmillo: simulated sword-and-shield fighters that learn skills from motion clips
@@ -34,12 +35,13 @@ def main(argv: list[str] | None = None) -> int:
         print(HELP, end="")
         return 0
     try:
-        status = _run(words[0], words[1:])
+        with interruptible():
+            status = _run(words[0], words[1:])
         sys.stdout.flush()
         return status
     except KeyboardInterrupt:
-        print("murmillo: broken off", file=sys.stderr)
-        return 130
+        print(BROKEN_OFF, file=sys.stderr)
+        return STATUS
     except BrokenPipeError:  # who reads has read enough: `| head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # Python flushes what is left when it ends
         return 141
