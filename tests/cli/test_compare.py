@@ -341,5 +341,7 @@ def test_help(murmillo: Murmillo) -> None:
 
 def test_decisions_count_as_the_control_steps_that_they_take(folder: Path) -> None:
     steps, decisions = read(make_run("low")), read(make_run("high", latent_env__steps=5))
+    assert steps is not None
+    assert decisions is not None
     for name in ("samples", "episode/length"):
         assert decisions.scalars[name].tolist() == (5 * steps.scalars[name]).tolist()
