@@ -98,7 +98,7 @@ def _factors(body: BodyConfig, kind: str, base: Character) -> dict[str, float]:
     for link, factor in getattr(body, kind).items():
         if link not in base.bodies:
             raise SuiteError(f"body.{kind}.{link}: no such body; there are: {', '.join(base.bodies)}")
-        if not (math.isfinite(factor) and factor > 0.0):
+        if not (isinstance(factor, (int, float)) and math.isfinite(factor) and factor > 0.0):
             raise SuiteError(f"body.{kind}.{link}={factor}: needs a factor above 0")
         factors[link] = factors.get(link, 1.0) * factor
     return factors

@@ -10,6 +10,7 @@ from murmillo.envs.errors import SuiteError
 from murmillo.envs.falls import FallConfig
 from murmillo.envs.features import FEATURES
 from murmillo.envs.starts import StartConfig
+from murmillo.envs.tasks.arguments import check_range
 from murmillo.envs.tasks.pushes import PushConfig
 from murmillo.envs.terrain import TerrainConfig
 
@@ -72,9 +73,8 @@ def check_config(config: EnvConfig, render_mode: str | None, modes: list[str]) -
     for name, least in (("window", 1), ("episode_steps", 1), ("residual_force", 0), ("width", 1), ("height", 1)):
         if getattr(config, name) < least:
             raise SuiteError(f"{name}={getattr(config, name)}: needs at least {least}")
-    friction = config.friction
-    if friction is not None and not (len(friction) == 2 and 0.0 <= friction[0] <= friction[1]):
-        raise SuiteError(f"friction={friction}: needs two numbers of at least 0, the lower one first")
+    if config.friction is not None:
+        check_range("friction", config.friction, least=0.0, of="")
     for name, value, known in (
         ("autoreset", config.autoreset, [mode.name.lower() for mode in AutoresetMode]),
         ("features", config.features, list(FEATURES)),

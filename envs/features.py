@@ -68,7 +68,10 @@ def make_features(name: Literal["character", "links"], character: Character) -> 
 
 
 class CharacterFeatures:
-    """`character_state` of `Character.base`: the state is the newest frame, a window the frames themselves."""
+    """`character_state` of `Character.base`: the state is the newest frame, a window the frames themselves.
+
+    Frames know no place and have their heights above the ground: those that are moved stay as they are.
+    """
 
     frames = 1
 

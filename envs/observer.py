@@ -9,7 +9,7 @@ from murmillo.envs.features import Features, Worlds
 from murmillo.envs.physics import State
 from murmillo.envs.terrain import MAP_SHAPE, Terrain
 
-LIMIT = 1e3
+LIMIT = 1000
 """Observations are cut off here; no sound simulation comes near (a diverging one may, before it is healed)."""
 
 
@@ -68,11 +68,11 @@ class Observer:
             seen["window"] = self._features.window(self.frames[:, -self._window :], self.ground)
         if self._terrain is not None:
             seen["heights"] = self._map
-        return {name: value.numpy() for name, value in seen.items()}
+        return {name: value.clamp(-LIMIT, LIMIT).numpy() for name, value in seen.items()}
 
     def _newest(self, state: State, worlds: Worlds = slice(None)) -> Tensor:
         ground = None if self.ground is None else self.ground[worlds]
-        return self._features.simulated(state, worlds, ground).clamp(-LIMIT, LIMIT)
+        return self._features.simulated(state, worlds, ground)
 
     def _look(self, state: State, worlds: Worlds = slice(None)) -> None:
         """See the ground about the roots of these worlds."""

@@ -57,10 +57,11 @@ def make_task(name: str, **arguments: Any) -> Task:
 def env_config(task_name: str = "Imitation", **kwargs: Any) -> EnvConfig:
     """`EnvConfig` from the settings of a task's id and keyword arguments.
 
-    `fall`, `starts`, `body`, ... may be dicts, or strings in place of their first setting: `body="LongThighs"`.
+    `fall`, `starts`, `body`, ... may be dicts, or strings in place of their first setting: `body="LongThighs"`. One
+    name may stand for a tuple of it: `clips="walk_*"`.
 
     Raises:
-        SuiteError: an argument that there is not, with the nearest that there is.
+        SuiteError: an argument that there is not, with the nearest that there is, or no dict where one is needed.
     """
     return _build(EnvConfig, _joined(TASKS[task_name].settings, kwargs), "")
 
@@ -86,5 +87,9 @@ def _build(cls: type, values: dict[str, Any], path: str) -> Any:
                 value = {fields(factory)[0].name: value}
             if isinstance(value, dict):
                 value = _build(factory, value, f"{path}{name}.")
+        if isinstance(factory, type) and not isinstance(value, factory):
+            raise SuiteError(f"{path}{name}={value}: needs values by name, a dict")
+        if known[name].default == () and isinstance(value, str):
+            value = (value,)
         nested[name] = value
     return cls(**nested)

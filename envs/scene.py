@@ -111,9 +111,8 @@ def add_box(
         margin: distance [m] from bodies at which it is already stopped; at 40 m/s it moves 0.33 m a substep, and would
             else pass through what is thinner. It lies on the ground all the same.
     """
-    patterns = [
-        sensor for sensor in spec.sensors if sensor.name.startswith(_GROUND)
-    ]  # one a body, in the bodies' order
+    # one a body, in the bodies' order
+    patterns = {s.name.removeprefix(_GROUND): s for s in spec.sensors if s.name.startswith(_GROUND)}
     box = spec.worldbody.add_body(name=name, pos=aside(len(spec.worldbody.bodies) - 1))
     box.add_freejoint(name=name)
     half = [0.5 * edge for edge in size]
@@ -121,13 +120,13 @@ def add_box(
     if margin:
         for ground in spec.worldbody.geoms:
             spec.add_pair(geomname1=ground.name, geomname2=name, condim=3, margin=0.0)
-    for pattern in patterns:
+    for body, pattern in patterns.items():
         spec.add_sensor(
-            name=f"{_HIT}{name}_{pattern.refname}",
+            name=f"{_HIT}{name}_{body}",
             type=mujoco.mjtSensor.mjSENS_CONTACT,
             objtype=mujoco.mjtObj.mjOBJ_BODY,
             objname=name,
             reftype=mujoco.mjtObj.mjOBJ_BODY,
-            refname=pattern.refname,
+            refname=body,
             intprm=pattern.intprm,
         )

@@ -28,7 +28,8 @@ class StartConfig:
         reference: of the rest, the share that begins in a clip; the others begin in the default pose.
         free_steps: steps in which a recovery or fallen start may lie on the ground (60 steps are 2 s).
         default_height: height of the pelvis in the default pose [m]; with other legs it is higher or lower by as much.
-        drop_height: fallen states are dropped from heights of this range [m] (the paper names no range).
+        drop_height: fallen states are dropped from heights of this range [m] (the paper names no range), with other
+            legs from as much higher or lower.
         fallen_states: most fallen states that are made; fewer for few worlds.
     """
 
@@ -83,8 +84,8 @@ class StartSampler:
         self.on_ground = True
         """Whether episodes may begin on the ground: fallen, or where the last one fell."""
         self._default = character.default_qpos.clone()
-        grown = character.default_qpos[2] - character.base.default_qpos[2]
-        self._default[2] = config.default_height + grown
+        self._grown = (character.default_qpos[2] - character.base.default_qpos[2]).item()
+        self._default[2] = config.default_height + self._grown
 
     def draw(self, fell: Tensor, generator: torch.Generator, kind: int | None = None) -> Starts:
         """Starts of n worlds; fell [n] bool says whose last episode ended by a fall; `kind` makes all of one kind."""
@@ -134,7 +135,7 @@ class StartSampler:
             physics = make_physics(self._character, n, threads=self._threads)
             qpos = self._default.repeat(n, 1)
             low, high = self.config.drop_height
-            qpos[:, 2] = low + (high - low) * torch.rand(n, generator=generator, dtype=torch.float64)
+            qpos[:, 2] = self._grown + low + (high - low) * torch.rand(n, generator=generator, dtype=torch.float64)
             orientation = torch.randn(n, 4, generator=generator, dtype=torch.float64)
             qpos[:, 3:7] = orientation / orientation.norm(dim=-1, keepdim=True)
             physics.write(torch.arange(n), qpos, torch.zeros_like(physics.state.qvel))

@@ -147,7 +147,7 @@ def make_terrain(config: TerrainConfig) -> Terrain | None:
 def _check(config: TerrainConfig) -> None:
     if config.kind not in KINDS:
         raise SuiteError(f"terrain.kind={config.kind}: no such ground; there are: {', '.join(KINDS)}")
-    if not 1 <= config.tiles <= 16:
+    if not (isinstance(config.tiles, int) and 1 <= config.tiles <= 16):
         raise SuiteError(f"terrain.tiles={config.tiles}: needs a number from 1 to 16")
     if not config.spacing <= MAP_SPACING:
         raise SuiteError(
@@ -155,8 +155,10 @@ def _check(config: TerrainConfig) -> None:
         )
     if not config.spacing >= 0.05 or not np.isclose(TILE / config.spacing, round(TILE / config.spacing)):
         raise SuiteError(f"terrain.spacing={config.spacing}: needs a whole fraction of {TILE:g} m, of at least 0.05 m")
-    if config.obstacles < 0:
-        raise SuiteError(f"terrain.obstacles={config.obstacles}: needs at least 0")
+    for name in ("obstacles", "seed"):
+        value = getattr(config, name)
+        if not (isinstance(value, int) and value >= 0):
+            raise SuiteError(f"terrain.{name}={value}: needs at least 0, a whole number")
 
 
 def _field(config: TerrainConfig, random: np.random.Generator) -> tuple[Heights, Heights]:

@@ -23,8 +23,9 @@ class Demonstrations:
         for with `frames`, they lie within their clips as far as those are long enough, and end at one of their frames.
 
         Returns:
-            window: [n, W, 120]; skill: [n] their labels; of the skills [n] asked for, or by the clips' weights. Where
-            clips were made without a sword or a shield, also mask: [n, 120] bool, true for features that are made up.
+            window: [n, W, D], 120 wide or as `Features.window` has it; skill: [n] their labels, of the skills [n] asked
+            for, or by the clips' weights. Where clips were made without a sword or a shield, also mask: [n, D] bool,
+            true for features that are made up.
         """
         library = self._library
         span = 0.0 if frames is None else (frames - 1) * library.character.control_dt
@@ -33,7 +34,10 @@ class Demonstrations:
         return drawn if library.mask is None else drawn | {"mask": library.mask[clip]}
 
     def imitation_pairs(self, n: int, generator: torch.Generator) -> dict[str, Tensor]:
-        """`state` [n, 120] of the clips, their `skill` [n], and the `action` [n, A] that targets the next pose."""
+        """`state` [n, ...] of the clips on level ground, their `skill` [n], and the `action` [n, A] to the next pose.
+
+        States are what `Features.state` gives of full frames, `length` too where the features have one.
+        """
         library, character = self._library, self._character
         clip, time = library.sample(n, generator)
         qpos_next, qvel_next = library.pose(clip, time + character.control_dt)

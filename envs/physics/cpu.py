@@ -82,6 +82,7 @@ class CpuPhysics:
         self._batch.reset(ids, stage=int(mujoco.mjtStage.mjSTAGE_NONE))
         self.state.qpos[env_ids] = qpos.double()
         self.state.qvel[env_ids] = qvel.double()
+        self.state.hit_force_w[env_ids] = 0.0
         self._batch.forward(ids, stage=int(mujoco.mjtStage.mjSTAGE_VEL))
 
     def set_friction(self, env_ids: Tensor, friction: Tensor) -> None:

@@ -27,17 +27,22 @@ def check_numbers(name: str, value: Any, *, above: float = -math.inf) -> None:
         raise SuiteError(f"task.{name}={value}: needs one or more numbers above {above:g}")
 
 
-def check_range(name: str, value: Any, *, least: float = -math.inf) -> None:
-    """Refuse what is not two finite numbers, the lowest of at least `least` first."""
+def check_range(name: str, value: Any, *, least: float = -math.inf, of: str = "task.") -> None:
+    """Refuse what is not two finite numbers, the lowest of at least `least` first; `of` is what has the argument."""
     if not _are_numbers(value, 2) or not least <= value[0] <= value[1]:
         bound = f" of at least {least:g}" if least > -math.inf else ""
-        raise SuiteError(f"task.{name}={value}: needs two numbers{bound}, the lower one first")
+        raise SuiteError(f"{of}{name}={value}: needs two numbers{bound}, the lower one first")
 
 
 def check_steps(name: str, value: Any) -> None:
     """Refuse what is not two whole numbers of control steps, the lower one first."""
-    if not _are_numbers(value, 2) or any(v != int(v) for v in value) or not 1 <= value[0] <= value[1]:
+    if not are_steps(value):
         raise SuiteError(f"task.{name}={value}: needs two whole numbers of at least 1, the lower one first")
+
+
+def are_steps(value: Any) -> bool:
+    """Whether these are two whole numbers of control steps, the lower one first."""
+    return _are_numbers(value, 2) and all(v == int(v) for v in value) and 1 <= value[0] <= value[1]
 
 
 def check_skill_steps(value: Any) -> None:

@@ -7,6 +7,7 @@ from torch import Tensor
 
 from murmillo.envs.character import Character
 from murmillo.envs.errors import SuiteError
+from murmillo.envs.tasks.arguments import are_steps, check_range
 from murmillo.envs.tasks.goals import directions, uniform
 
 
@@ -71,10 +72,11 @@ class RandomPushes:
     def __init__(self, character: Character, config: PushConfig, num_envs: int) -> None:
         """Raises SuiteError naming the setting that cannot be."""
         every = config.every or (1, 1)
-        for name, pair, least in (("every", every, 1), ("force", config.force, 0), ("steps", (config.steps,) * 2, 1)):
-            if not least <= pair[0] <= pair[1]:
-                value = getattr(config, name)
-                raise SuiteError(f"pushes.{name}={value}: needs at least {least}, the lower one of two numbers first")
+        if not are_steps(every):
+            raise SuiteError(f"pushes.every={every}: needs at least 1 twice, whole numbers with the lower one first")
+        if not are_steps((config.steps, config.steps)):
+            raise SuiteError(f"pushes.steps={config.steps}: needs at least 1, a whole number")
+        check_range("force", config.force, least=0.0, of="pushes.")
         if config.body not in character.bodies:
             raise SuiteError(f"pushes.body={config.body}: no such body; there are: {', '.join(character.bodies)}")
         self.body = character.bodies.index(config.body)

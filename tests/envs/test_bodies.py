@@ -1,6 +1,7 @@
 """Other bodies: what becomes longer and heavier, what locks take away, and what stays as the base policy knows it."""
 
 import gymnasium
+import mujoco
 import numpy as np
 import pytest
 import torch
@@ -70,6 +71,18 @@ def test_factors_add_to_a_shape_and_density_to_a_mass() -> None:
     assert masses(body)["head"] == pytest.approx(2.0 * masses(base)["head"])
 
 
+def test_what_is_turned_in_its_body_is_stretched_along_the_body() -> None:
+    """A strap of the sandal, turned by 0.25 rad about y, on a foot that is twice as long."""
+    base, body = load_character("humanoid"), load_body("humanoid", BodyConfig(length={"right_foot": 2.0}))
+    models = [character.render_model() for character in (base, body)]
+    foot, box = models[0].body("right_foot").id, mujoco.mjtGeom.mjGEOM_BOX
+    straps = [g for g in range(models[0].ngeom) if models[0].geom_bodyid[g] == foot and models[0].geom_type[g] == box]
+    turned = [g for g in straps if models[0].geom_quat[g, 2] == pytest.approx(np.sin(0.125))]
+    assert len(turned) == 1
+    along = [np.hypot(2.0 * np.cos(0.25), np.sin(0.25)), 1.0, np.hypot(2.0 * np.sin(0.25), np.cos(0.25))]
+    assert models[1].geom_size[turned[0]] == pytest.approx(models[0].geom_size[turned[0]] * along)
+
+
 @pytest.mark.parametrize("name", CHARACTERS)
 @pytest.mark.parametrize("lock", LOCKS)
 def test_a_lock_takes_its_joints_and_says_which_outputs_go(name: str, lock: str) -> None:
@@ -105,12 +118,16 @@ def test_a_locked_body_is_seen_as_its_base_is(features: str) -> None:
     assert env.single_observation_space == base.single_observation_space
     assert env.action_space.shape == (4, 24)
     assert env.character.pruned == (0, 1, 2, 17)
+    assert make(1, body={"locked": "right_knee"}).character.pruned == (17,)
     drawn = [e.demonstrations(5, torch.Generator().manual_seed(0))["window"] for e in (base, env)]
     assert torch.equal(*drawn)
     obs, _ = env.reset(seed=0)
     assert env.observation_space.contains(obs)
     env.step(np.zeros((4, 24), np.float32))
-    assert env.demonstrations.imitation_pairs(3, torch.Generator())["action"].shape == (3, 24)
+    pairs = [e.demonstrations.imitation_pairs(3, torch.Generator().manual_seed(1)) for e in (base, env)]
+    kept = [action for action in range(28) if action not in env.character.pruned]
+    assert torch.equal(pairs[0]["action"][:, kept], pairs[1]["action"])
+    assert torch.equal(pairs[0]["state"], pairs[1]["state"])
 
 
 def test_starts_of_longer_legs_are_above_the_floor() -> None:
@@ -129,6 +146,9 @@ def test_starts_of_longer_legs_are_above_the_floor() -> None:
         ({"length": {"thigh": 1.5}}, "body.length.thigh: no such body; there are: pelvis, torso"),
         ({"length": {"pelvis": 0.0}}, "body.length.pelvis=0.0: needs a factor above 0"),
         ({"density": {"head": float("nan")}}, "body.density.head=nan: needs a factor above 0"),
+        ({"length": {"pelvis": "long"}}, "body.length.pelvis=long: needs a factor above 0"),
+        ({"length": 1.5}, "body.length=1.5: needs values by name, a dict"),
+        (1.5, "body=1.5: needs values by name, a dict"),
         ({"locked": ("knee",)}, "body.locked=knee: no such joint; there are: abdomen, elbows, ankles, right_knee"),
         ({"thickness": {"left_thigh": 3.0}}, r"body: \w+ and left_thigh interpenetrate by .* cm at rest; take smaller"),
         ({"lenght": {}}, "body.lenght: no such argument; did you mean body.length?"),

@@ -69,6 +69,12 @@ def test_pushes_come_at_their_times_and_last_for_theirs() -> None:
         assert set(begins.diff().tolist()) <= {10, 11, 12}
         lengths = ends[ends > begins[0]][: len(begins)] - begins[: len(ends[ends > begins[0]])]
         assert set(lengths.tolist()) == {6}
+    pushes.advance(generator)
+    under_way = pushes.force_w.norm(dim=-1) > 0.0
+    again = torch.arange(32) % 2 == 0
+    assert (under_way & again).any()
+    pushes.reset(again.nonzero().squeeze(-1), generator)
+    assert torch.equal(pushes.force_w.norm(dim=-1) > 0.0, under_way & ~again)
 
 
 def test_a_push_moves_the_torso_of_the_world_that_it_comes_in() -> None:
@@ -104,6 +110,10 @@ def test_a_push_of_a_users_adds_to_them() -> None:
         ({"friction": (0.9, 0.2)}, r"friction=\(0.9, 0.2\): needs two numbers of at least 0, the lower one first"),
         ({"friction": (-0.1, 0.2)}, "friction="),
         ({"friction": (0.2,)}, r"friction=\(0.2,\)"),
+        ({"friction": 0.3}, "friction=0.3: needs two numbers"),
+        ({"pushes": {"every": 5}}, "pushes.every=5: needs at least 1 twice"),
+        ({"pushes": {"every": (1.5, 2.0)}}, r"pushes.every=\(1.5, 2.0\)"),
+        ({"pushes": {"every": (5, 9), "force": 1000.0}}, "pushes.force=1000.0: needs two numbers of at least 0"),
         ({"pushes": {"every": (0, 3)}}, r"pushes.every=\(0, 3\): needs at least 1"),
         ({"pushes": {"every": (5, 3)}}, "pushes.every"),
         ({"pushes": {"every": (5, 9), "steps": 0}}, "pushes.steps=0: needs at least 1"),

@@ -10,7 +10,7 @@ from murmillo.envs import EnvConfig, HumanoidVectorEnv, SuiteError
 from murmillo.envs.character import Character, load_character
 from murmillo.envs.features import CharacterFeatures, LinkFeatures
 from murmillo.envs.motion import MotionLibrary, load_clips
-from murmillo.envs.rotations import heading, quat_mul, quat_rotate
+from murmillo.envs.rotations import heading, heading_quat, quat_conj, quat_mul, quat_rotate
 from murmillo.envs.starts import StartConfig
 
 CHARACTERS = ("humanoid", "sword_shield")
@@ -64,12 +64,18 @@ def test_the_newest_frame_is_seen_from_its_own_root_and_the_others_from_there_to
     torch.testing.assert_close(state[:, -1, 0, 2], root_w[:, 2], atol=1e-6, rtol=0)
     assert heading(state[:, -1, 0, 3:7]).abs().max() < 1e-5
     yaw = heading(root_quat_w)
+    root_velocity = quat_rotate(quat_conj(heading_quat(root_quat_w)), env.state.qvel[:, :3])
+    torch.testing.assert_close(state[:, -1, 0, 7:10], root_velocity, atol=1e-5, rtol=1e-5)
+    root_spin = quat_rotate(state[:, -1, 0, 3:7], env.state.qvel[:, 3:6])
+    torch.testing.assert_close(state[:, -1, 0, 10:13], root_spin, atol=1e-4, rtol=1e-4)
     for back, (pos_w, _) in enumerate(reversed(seen[1:]), start=1):
         offset = pos_w - root_w.unsqueeze(1)
         offset[..., 2] = pos_w[..., 2]
         ahead, aside = yaw.cos().unsqueeze(-1), yaw.sin().unsqueeze(-1)
         x = ahead * offset[..., 0] + aside * offset[..., 1]
+        y = ahead * offset[..., 1] - aside * offset[..., 0]
         torch.testing.assert_close(state[:, -1 - back, :, 0], x, atol=1e-5, rtol=0)
+        torch.testing.assert_close(state[:, -1 - back, :, 1], y, atol=1e-5, rtol=0)
         torch.testing.assert_close(state[:, -1 - back, :, 2], offset[..., 2], atol=1e-5, rtol=0)
 
 
@@ -124,6 +130,20 @@ def test_what_is_seen_depends_on_neither_place_nor_heading_nor_a_quaternions_sig
     torch.testing.assert_close(features.window(frames), features.window(moved.flatten(-2)), atol=1e-6, rtol=0)
     states = [features.state(f[:, -4:], torch.full((6,), 4))["state"] for f in (frames, moved.flatten(-2))]
     torch.testing.assert_close(*states, atol=1e-6, rtol=0)
+
+
+def test_who_has_come_far_sees_the_same() -> None:
+    env = make()
+    env.reset(seed=0)
+    kept = env.state_dict()
+    near = act(env, 0)
+    kept["physics"]["qpos"][:, :2] += 2000.0
+    by = torch.tensor([2000.0, 2000.0, 0.0], dtype=torch.float64).repeat(6, 1)
+    env.load_state_dict(kept | {"history": env.library.features.moved(kept["history"], by)})
+    far = act(env, 0)
+    assert env.state.qpos[:, :2].abs().min() > 1900.0
+    for name, value in far.items():
+        np.testing.assert_allclose(value, near[name], atol=5e-3)
 
 
 @pytest.mark.parametrize("kind", [CharacterFeatures, LinkFeatures])

@@ -9,6 +9,7 @@ import torch
 
 from murmillo.envs.character import Character, load_character
 from murmillo.envs.errors import SuiteError
+from murmillo.envs.falls import count_every_contact
 from murmillo.envs.physics import Physics, make_physics
 from murmillo.envs.scene import Scene, add_box, aside
 
@@ -97,6 +98,21 @@ def test_what_is_felt_is_the_greatest_force_of_the_substeps(character, thrown):
             greatest = np.where(np.abs(force) > np.abs(greatest), force, greatest)
         np.testing.assert_array_equal(physics.state.hit_force_w[world].flatten(), greatest)
     assert physics.state.hit_force_w.flatten(1).any(-1).sum() > 4
+
+
+def test_hits_are_felt_whatever_the_ground_sensors_count(character, thrown):
+    physics, every = thrown(), load_character(edit=count_every_contact)
+    other = make_physics(Scene(every, partial(CUBE, margin=0.1)), 16, threads=1)
+    other.load_state_dict(physics.state_dict())
+    ctrl = character.targets(torch.zeros(16, 31, dtype=torch.float64))
+    for one in (physics, other):
+        one.step(ctrl)
+    assert physics.state.hit_force_w.any()
+    assert torch.equal(physics.state.hit_force_w, other.state.hit_force_w)
+    ids = torch.arange(0, 16, 2)
+    physics.write(ids, character.default_qpos.expand(8, -1), torch.zeros(8, character.model.nv))
+    assert not physics.state.hit_force_w[ids].any()
+    assert physics.state.hit_force_w[ids + 1].any()
 
 
 def test_hits_are_alike_at_any_number_of_threads_and_after_loading(character, thrown):

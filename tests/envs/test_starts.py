@@ -3,10 +3,14 @@
 import pytest
 import torch
 
+from murmillo.envs import starts
+from murmillo.envs.bodies import BodyConfig, load_body
 from murmillo.envs.character import Character, load_character
 from murmillo.envs.geometry import lowest_point
 from murmillo.envs.motion import MotionLibrary, load_clips
-from murmillo.envs.starts import DEFAULT, RECOVERY, REFERENCE, StartConfig, StartSampler
+from murmillo.envs.physics.cpu import CpuPhysics
+from murmillo.envs.scene import Scene
+from murmillo.envs.starts import DEFAULT, FALLEN, RECOVERY, REFERENCE, StartConfig, StartSampler
 
 
 @pytest.fixture(scope="module")
@@ -49,6 +53,28 @@ def test_only_who_fell_goes_on_from_there(
     assert (starts.qpos[~fell, 2] == 0.89).all()
     sampler.on_ground = False
     assert (sampler.draw(fell, generator).kind == DEFAULT).all()
+
+
+@pytest.mark.parametrize("shape", ["", "SuperLongLegs"])
+def test_fallen_states_are_dropped_from_above_the_floor_whatever_the_legs(
+    shape: str, library: MotionLibrary, generator: torch.Generator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    dropped: list[torch.Tensor] = []
+
+    class Watched(CpuPhysics):
+        def write(self, env_ids: torch.Tensor, qpos: torch.Tensor, qvel: torch.Tensor) -> None:
+            dropped.append(qpos.clone())
+            super().write(env_ids, qpos, qvel)
+
+    monkeypatch.setattr(
+        starts, "make_physics", lambda character, n, threads: Watched(Scene(character), n, threads=threads)
+    )
+    body = load_body("sword_shield", BodyConfig(shape))
+    sampler = StartSampler(body, library, StartConfig(drop_height=(0.9, 0.9)), 32, frames=1, threads=1)
+    sampler.draw(torch.zeros(32, dtype=torch.bool), generator, FALLEN)
+    [qpos] = dropped
+    above = qpos[:, 2] - body.default_qpos[2]
+    assert above.tolist() == pytest.approx([0.9 - load_character().default_qpos[2].item()] * 32)
 
 
 @pytest.fixture

@@ -138,7 +138,20 @@ def test_the_observation_is_of_the_ground_where_the_character_is_now() -> None:
         np.testing.assert_allclose(obs["heights"], expected, atol=5e-4)  # float32 beside walls, whatever the batch
         newest = obs["state"][np.arange(6), obs["length"] - 1]
         np.testing.assert_allclose(newest[:, 2], (root[:, 2] - terrain.height(root)).numpy(), atol=1e-5)
+        np.testing.assert_array_equal(obs["window"][:, -1, :7], newest[:, :7])
         obs, *_ = env.step(noise(env, step))
+
+
+def test_the_papers_state_has_its_height_above_the_ground() -> None:
+    env = make(8, "Location", kind="slopes", window=3)
+    obs, _ = env.reset(seed=0)
+    terrain = ground_of(env)
+    for step in range(3):
+        height = env.state.qpos[:, 2] - terrain.height(env.state.qpos)
+        np.testing.assert_allclose(obs["state"][:, 0], height.numpy(), atol=1e-5)
+        np.testing.assert_array_equal(obs["window"][:, -1], obs["state"])
+        obs, *_ = env.step(noise(env, step))
+    assert terrain.height(env.state.qpos).abs().max() > 0.1
 
 
 def test_standing_on_a_slope_is_no_fall_however_deep_the_pit() -> None:
@@ -150,6 +163,17 @@ def test_standing_on_a_slope_is_no_fall_however_deep_the_pit() -> None:
         pos = torch.full((1, bodies, 3), height, dtype=torch.float64)
         now = type(state)(**{**vars(state), "ground_force_w": force, "body_pos_w": pos})
         assert env._fallen(now, torch.tensor([ground], dtype=torch.float64)).tolist() == [fall]
+
+
+def test_who_lies_on_a_hill_has_fallen() -> None:
+    env = make(16, "Location", kind="slopes", starts={"free_steps": 0})
+    env.reset(seed=0, options={"start": "fallen"})
+    ground, fell = ground_of(env).height(env.state.qpos), np.zeros(16, dtype=bool)
+    assert ground.max() > 0.35
+    for step in range(20):
+        *_, info = env.step(noise(env, step))
+        fell |= info["fall"]
+    assert fell.all()
 
 
 def test_who_leaves_the_field_is_truncated_and_not_terminated() -> None:
@@ -186,9 +210,10 @@ def test_a_state_continues_bit_for_bit() -> None:
         return seen
 
     roll(5)
-    kept = env.state_dict()
+    kept, now = env.state_dict(), env.observation()
     first = roll(12)
     env.load_state_dict(kept)
+    assert all(np.array_equal(now[name], value) for name, value in env.observation().items())
     assert all(map(np.array_equal, first, roll(12)))
 
 
@@ -200,6 +225,8 @@ def test_a_state_continues_bit_for_bit() -> None:
         ({"spacing": 0.07}, "terrain.spacing=0.07: needs a whole fraction of 6 m"),
         ({"spacing": float("nan")}, "terrain.spacing=nan"),
         ({"tiles": 0}, "terrain.tiles=0: needs a number from 1 to 16"),
+        ({"tiles": 1.5}, "terrain.tiles=1.5: needs a number from 1 to 16"),
+        ({"seed": -1}, "terrain.seed=-1: needs at least 0"),
         ({"obstacles": -1}, "terrain.obstacles=-1: needs at least 0"),
         ({"obstacles": 400}, "terrain.obstacles=400: leave no room to stand on a tile; take fewer"),
     ],
