@@ -1,3 +1,4 @@
+import math
 from pathlib import Path
 
 import pytest
@@ -196,6 +197,9 @@ def test_what_does_not_fit_is_refused_in_one_line(generator: torch.Generator) ->
         (r"agent\.window=4: the environment's windows are \[3, 2\]", {"window": 4}, Wanderer(3), None),
         (r"agent\.method=magic is not one of adaptnet, finetune, progressive", {"method": "magic"}, Wanderer(3), None),
         (r"agent\.weight_decay=-1: a penalty is 0 or more", {"weight_decay": -1}, Wanderer(3), None),
+        (r"agent\.injection_penalty=nan: a penalty is 0 or more", {"injection_penalty": math.nan}, Wanderer(3), None),
+        (r"agent\.popart=0: needs a share above 0", {"popart": 0}, Wanderer(3), None),
+        ("the base acts by a map of heights, the environment shows none", {}, Wanderer(3), make_base(heights=True)),
         ("the checkpoint's base policy differs from the config's", {"recurrent": 8}, Wanderer(3), make_base()),
     ]
     for line, changes, env, base in cases:
