@@ -96,6 +96,13 @@ def test_only_valid_frames_are_normalised_by(tmp_path: Path) -> None:
     torch.testing.assert_close(normalizer.mean, valid.double().mean(0))
 
 
+def test_the_critic_learns_returns_in_units_that_know_them(tmp_path: Path) -> None:
+    runner = toy_runner(tmp_path, Wanderer(32), 1)
+    targets = runner.agent.model.targets(step(runner))  # type: ignore[attr-defined]
+    torch.testing.assert_close(targets.mean(0), torch.zeros(2), atol=1e-4, rtol=0)
+    torch.testing.assert_close(targets.std(0, correction=0), torch.ones(2), atol=1e-2, rtol=0)
+
+
 def test_only_what_is_new_learns(tmp_path: Path) -> None:
     base = make_base()
     runner = toy_runner(tmp_path, Wanderer(32), 1, base)
