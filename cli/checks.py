@@ -18,16 +18,10 @@ _LEAST = {
         "runner.samples",
         "agent.window",
         "agent.latent_dim",
-        "agent.ppo.minibatch",
-        "agent.ppo.epochs",
-        "agent.discriminator.minibatch",
-        "agent.discriminator.updates",
-        "warm_start.pairs",
-        "warm_start.minibatch",
         "run.measured_worlds",
         "run.keep_every",
     ),
-    0: ("runner.max_minutes", "runner.checkpoint_minutes", "warm_start.steps"),
+    0: ("runner.max_minutes", "runner.checkpoint_minutes"),
 }
 """The least that these settings may be."""
 

@@ -105,13 +105,19 @@ def compose_train(words: list[str]) -> TrainConfig:
 
 def typed(composed: DictConfig, choices: Mapping[str, Any]) -> TrainConfig:
     """The dataclasses of a composed configuration; `choices` are hydra's, by group."""
+    values = resolved(composed)
+    chosen = {group: str(choices[group]) for group in GROUPS if group in choices}
+    values["agent"] = build(AGENTS[chosen["agent"]].config, values["agent"], "agent.")
+    return build(TrainConfig, {**values, "choices": chosen})
+
+
+def resolved(composed: DictConfig) -> dict[str, Any]:
+    """The plain values of a composed configuration. Raises CommandError where one is missing."""
     try:
         values: Any = OmegaConf.to_container(composed, resolve=True, throw_on_missing=True, enum_to_str=True)
     except OmegaConfBaseException as error:
         raise command_error(error, composed) from None
-    chosen = {group: str(choices[group]) for group in GROUPS if group in choices}
-    values["agent"] = build(AGENTS[chosen["agent"]].config, values["agent"], "agent.")
-    return build(TrainConfig, {**values, "choices": chosen})
+    return values
 
 
 def save(config: Any, folder: Path) -> None:

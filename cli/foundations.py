@@ -1,6 +1,7 @@
 """A run that another one is built on: found, and known again by its checkpoint."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,19 @@ from murmillo.cli.errors import CommandError
 from murmillo.cli.evaluation.identity import checkpoint_digest
 
 _ABSENT = "none"
+
+
+@dataclass(frozen=True)
+class Foundation:
+    """A run that another one is built on.
+
+    Attributes:
+        word: as the user named it.
+        folder: of the run.
+    """
+
+    word: str
+    folder: Path
 
 
 def trained_run(word: str, setting: str) -> Path:

@@ -2,8 +2,9 @@
 
 import csv
 import shlex
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from omegaconf import OmegaConf
@@ -23,24 +24,72 @@ def write(folder: Path) -> Path:
     scalars = read_scalars(folder / runs.SCALARS)
     config = OmegaConf.load(folder / runs.CONFIG)
     measures = runs.read_json(folder / runs.MEASURES, {})
+    return assemble(
+        folder,
+        scalars,
+        what=_what(config, scalars),
+        found=[
+            _ages(measures),
+            obedience.section(measures, runs.read_json(folder / runs.SKILLS, {})),
+            encodings.section(measures),
+            evaluation.section(runs.read_json(folder / runs.METRICS)),
+        ],
+        draw=lambda: plot_all(scalars, folder / runs.PLOTS),
+        going_on=_going_on(folder, config, scalars),
+    )
+
+
+def assemble(
+    folder: Path,
+    scalars: Scalars,
+    *,
+    what: str,
+    found: Sequence[str],
+    draw: Callable[[], list[Path]],
+    going_on: str,
+    metrics: tuple[Metric, ...] = TRAINING,
+) -> Path:
+    """Write `report.md` of any run; its path.
+
+    Args:
+        folder: of the run.
+        scalars: of its log.
+        what: was trained, in a sentence or two.
+        found: sections on what came of it; empty ones are left out.
+        draw: makes the plots, once an iteration has been made.
+        going_on: the last section.
+        metrics: of the log that are shown.
+    """
     sections = [
         f"# {folder.name}",
-        _what(config, runs.read_json(folder / runs.VERSIONS, {}), scalars),
+        f"{what}\n\n{made_on(runs.read_json(folder / runs.VERSIONS, {}))}",
         terms(runs.read_json(folder / runs.TERMS)),
         film(folder),
         notices(runs.read_json(folder / runs.NOTICES, [])),
-        _ages(measures),
-        obedience.section(measures, runs.read_json(folder / runs.SKILLS, {})),
-        encodings.section(measures),
-        evaluation.section(runs.read_json(folder / runs.METRICS)),
+        *found,
     ]
     if len(scalars["samples"]):
-        plots = plot_all(scalars, folder / runs.PLOTS)
-        sections += [first_and_last(scalars), minutes(scalars), pictures(plots, folder)]
-    sections += [meanings(scalars), _going_on(folder, config, scalars)]
+        sections += [first_and_last(scalars, metrics), minutes(scalars, metrics), pictures(draw(), folder)]
+    sections += [meanings(scalars, metrics), going_on]
     path = folder / runs.REPORT
     runs.write_text(path, "\n\n".join(section for section in sections if section) + "\n")
     return path
+
+
+class Effort(NamedTuple):
+    """What a training has taken: samples, minutes, and samples a second."""
+
+    samples: int
+    minutes: float
+    rate: float
+
+    @classmethod
+    def of(cls, scalars: Scalars) -> "Effort":
+        """By the log; all 0 before the first iteration."""
+        if not len(scalars["samples"]):
+            return cls(0, 0.0, 0.0)
+        samples, seconds = int(scalars["samples"][-1]), float(scalars["seconds"][-1])
+        return cls(samples, seconds / 60.0, samples / seconds if seconds else 0.0)
 
 
 def read_scalars(path: Path) -> Scalars:
@@ -56,19 +105,15 @@ def read_scalars(path: Path) -> Scalars:
     return scalars
 
 
-def _what(config: Any, versions: dict[str, Any], scalars: Scalars) -> str:
-    choices = config.choices
-    samples = int(scalars["samples"][-1]) if len(scalars["samples"]) else 0
-    minutes = scalars["seconds"][-1] / 60.0 if samples else 0.0
-    rate = samples / (60.0 * minutes) if minutes else 0.0
+def _what(config: Any, scalars: Scalars) -> str:
+    choices, (samples, minutes, rate) = config.choices, Effort.of(scalars)
     chosen = f" ({', '.join(config.clips)})" if config.get("clips") else ""
     changed = "" if choices.ablation == "none" else f" with the ablation `{choices.ablation}`"
     return (
         f"`{choices.agent}`{changed} learned from the clips `{config.motions}`{chosen} with the budget "
         f"`{choices.budget}`, seed {config.seed}: {samples:,} samples (control steps of 1/30 s, "
         f"{samples / 30 / 3600:.1f} simulated hours) in {minutes:.1f} minutes, {rate:,.0f} samples/s, "
-        f"in {config.num_envs} worlds.\n\n"
-        f"{made_on(versions)}"
+        f"in {config.num_envs} worlds."
     )
 
 
@@ -202,7 +247,7 @@ def meanings(scalars: Scalars, metrics: tuple[Metric, ...] = TRAINING + LABELS) 
 
 
 def _going_on(folder: Path, config: Any, scalars: Scalars) -> str:
-    samples = int(scalars["samples"][-1]) if len(scalars["samples"]) else 0
+    samples = Effort.of(scalars).samples
     run = shlex.quote(str(folder))
     lines = [
         "# train this run on, for an hour at most",

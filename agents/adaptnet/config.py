@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from murmillo.agents.adaptnet.ensemble import EnsembleConfig
 from murmillo.agents.common.adapter import AdapterConfig
 from murmillo.agents.common.errors import AgentError
+from murmillo.agents.common.numbers import check_at_least
 from murmillo.agents.common.ppo import PPOConfig
 
 METHODS = ("adaptnet", "finetune", "progressive")
@@ -60,5 +61,8 @@ class AdaptNetConfig:
         if self.method not in METHODS:
             raise AgentError(f"agent.method={self.method} is not one of {', '.join(METHODS)}")
         for name in ("injection_penalty", "weight_decay"):
-            if getattr(self, name) < 0:
+            if not getattr(self, name) >= 0:
                 raise AgentError(f"agent.{name}={getattr(self, name)}: a penalty is 0 or more")
+        check_at_least(1, self, "agent", "recurrent")
+        if not 0 < self.popart <= 1:
+            raise AgentError(f"agent.popart={self.popart}: needs a share above 0, at most 1")

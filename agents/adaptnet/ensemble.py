@@ -14,8 +14,8 @@ from murmillo.agents.common.discriminator import (
     Windows,
     input_gradient,
 )
-from murmillo.agents.common.errors import AgentError
 from murmillo.agents.common.networks import mlp
+from murmillo.agents.common.numbers import check_at_least
 from murmillo.agents.common.recurrent import LastOutput
 
 
@@ -42,9 +42,8 @@ class EnsembleConfig:
     gradient_penalty: float = 10.0
 
     def __post_init__(self) -> None:
-        for name in ("heads", "minibatch", "epochs"):
-            if getattr(self, name) < 1:
-                raise AgentError(f"agent.discriminator.{name}={getattr(self, name)}: needs at least 1")
+        check_at_least(1, self, "agent.discriminator", "recurrent", "heads", "minibatch", "epochs")
+        check_at_least(0, self, "agent.discriminator", "learning_rate", "gradient_penalty")
 
 
 class AllHeads(Condition):

@@ -89,6 +89,10 @@ def make_model(
             "prune the outputs of joints that are locked"
         )
     seen_maps = any(name.startswith("encoder.controls") for name in base.policy)
+    if seen_maps and not maps:
+        raise AgentError(
+            "the base acts by a map of heights, the environment shows none; give it uneven ground, or name another base"
+        )
     own = RecurrentPolicy(_encoder(observed, config, generator, seen_maps), base.actions, hidden, std, generator)
     load_module(own, base.policy, "base policy")
     frozen = RunningNormalizer((observed.state_dim,))

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 from murmillo.agents.common.discriminator import DiscriminatorConfig
 from murmillo.agents.common.errors import AgentError
+from murmillo.agents.common.numbers import check_above_zero, check_at_least
 from murmillo.agents.common.ppo import PPOConfig
 
 CHOICES = {"skill_reward": ("log_q", "clamped"), "diversity": ("action", "kl", "none")}
@@ -48,3 +49,5 @@ class ASEConfig:
         for name, choices in CHOICES.items():
             if getattr(self, name) not in choices:
                 raise AgentError(f"agent.{name}={getattr(self, name)} is not one of {', '.join(choices)}")
+        check_above_zero(self, "agent", "kappa")
+        check_at_least(0, self, "agent", "diversity_weight")

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 from murmillo.agents.common.discriminator import DiscriminatorConfig
 from murmillo.agents.common.errors import AgentError
+from murmillo.agents.common.numbers import check_at_least
 from murmillo.agents.common.ppo import PPOConfig
 
 NEGATIVES = ("sphere", "shuffled", "none")
@@ -32,6 +33,10 @@ class EncoderConfig:
     uniformity_weight: float = 0.05
     minibatch: int = 4096
     pool: int = 16384
+
+    def __post_init__(self) -> None:
+        check_at_least(0, self, "agent.encoder", "alignment_weight", "uniformity_weight")
+        check_at_least(2, self, "agent.encoder", "minibatch")  # the losses compare motions
 
 
 @dataclass

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 
 from murmillo.agents.common.discriminator import DiscriminatorConfig
 from murmillo.agents.common.errors import AgentError
+from murmillo.agents.common.numbers import check_above_zero, check_at_least
 from murmillo.agents.common.ppo import PPOConfig
 
 CHOICES = {
@@ -67,3 +68,5 @@ class CASEConfig:
         for name in ("focal_rate", "focal_floor"):
             if not 0 < getattr(self, name) <= 1:
                 raise AgentError(f"agent.{name}={getattr(self, name)}: needs a share above 0, at most 1")
+        check_above_zero(self, "agent", "kappa")
+        check_at_least(0, self, "agent", "diversity_weight", "focal_start", "upright_iterations")

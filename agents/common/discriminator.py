@@ -11,9 +11,9 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from murmillo.agents.common.errors import AgentError
 from murmillo.agents.common.networks import Dropout, linear, mlp
 from murmillo.agents.common.normalizer import RunningNormalizer
+from murmillo.agents.common.numbers import check_at_least
 
 
 @dataclass
@@ -46,8 +46,10 @@ class DiscriminatorConfig:
     dropout: float = 0.0
 
     def __post_init__(self) -> None:
-        if self.updates < 1:
-            raise AgentError(f"agent.discriminator.updates={self.updates}: needs at least 1")
+        check_at_least(1, self, "agent.discriminator", "minibatch", "updates")
+        check_at_least(
+            0, self, "agent.discriminator", "learning_rate", "gradient_penalty", "logit_decay", "weight_decay"
+        )
 
 
 class Windows(NamedTuple):

@@ -6,7 +6,7 @@ At NaN the runner itself stops.
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from murmillo.agents.common.errors import AgentError
+from murmillo.agents.common.numbers import check_at_least
 
 WATCHED = {
     "agent_accuracy": "discriminator/agent_accuracy",
@@ -58,9 +58,8 @@ class WatchConfig:
     fall_iterations: int = 100
 
     def __post_init__(self) -> None:
-        for name in ("memory", "accuracy_iterations", "skill_iterations", "value_iterations", "fall_iterations"):
-            if getattr(self, name) < 1:
-                raise AgentError(f"runner.watch.{name}={getattr(self, name)}: needs at least 1")
+        patience = ("accuracy_iterations", "skill_iterations", "value_iterations", "fall_iterations")
+        check_at_least(1, self, "runner.watch", "memory", *patience)
 
 
 @dataclass

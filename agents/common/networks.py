@@ -155,8 +155,6 @@ class GaussianPolicy(Policy):
             activation: after every hidden layer.
         """
         super().__init__()
-        if std <= 0:
-            raise AgentError(f"ppo.std={std} is no standard deviation; the paper has 0.05")
         self.style = style_mlp(condition_dim, style_hidden, generator) if style_hidden else nn.Identity()
         self.trunk = mlp([state_dim + condition_dim, *hidden], generator, activation=activation)
         self.head = linear(hidden[-1], action_dim, generator)

@@ -12,6 +12,7 @@ from murmillo.agents.common.errors import AgentError
 from murmillo.agents.common.losses import approx_kl, clip_fraction, ppo_policy_loss, value_loss
 from murmillo.agents.common.networks import Critic, GaussianPolicy, Policy, Told
 from murmillo.agents.common.normalizer import RunningNormalizer
+from murmillo.agents.common.numbers import check_above_zero, check_at_least
 from murmillo.agents.common.rollout import Rollout
 from murmillo.agents.common.training import Means, adam, adam_state, load_adam_state, load_module, minimise
 
@@ -53,6 +54,12 @@ class PPOConfig:
     value_weight: float = 1.0
     max_grad_norm: float | None = None
     target_kl: float | None = None
+
+    def __post_init__(self) -> None:
+        check_at_least(1, self, "agent.ppo", "epochs", "minibatch")
+        check_at_least(0, self, "agent.ppo", "policy_learning_rate", "value_learning_rate")
+        check_at_least(0, self, "agent.ppo", "mean_init_scale", "bound_weight", "value_weight")
+        check_above_zero(self, "agent.ppo", "std", "clip", "max_grad_norm", "target_kl")
 
 
 class ActorCritic(nn.Module):

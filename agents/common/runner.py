@@ -54,6 +54,12 @@ class RunnerConfig:
     termination_reward: float | None = None
     watch: WatchConfig = field(default_factory=WatchConfig)
 
+    def __post_init__(self) -> None:
+        weights = {f"reward_weights.{term}": weight for term, weight in self.reward_weights.items()}
+        for name, value in {**weights, "termination_reward": self.termination_reward}.items():
+            if value is not None and not math.isfinite(value):
+                raise AgentError(f"runner.{name}={value}: needs a finite number")
+
 
 class Runner:
     """Trains an agent in a vector environment, exactly resumable: N iterations and N more are 2 N, bit for bit.

@@ -8,6 +8,7 @@ from torch.nn import functional as F
 
 from murmillo.agents.common.interface import ImitationPairs
 from murmillo.agents.common.networks import Told
+from murmillo.agents.common.numbers import check_at_least
 from murmillo.agents.common.ppo import ActorCritic
 from murmillo.agents.common.training import adam
 
@@ -29,6 +30,10 @@ class WarmStartConfig:
     pairs: int = 32768
     minibatch: int = 1024
     learning_rate: float = 1e-3
+
+    def __post_init__(self) -> None:
+        check_at_least(0, self, "warm_start", "steps", "learning_rate")
+        check_at_least(1, self, "warm_start", "pairs", "minibatch")
 
 
 def warm_start(

@@ -18,10 +18,10 @@ _POINTS = 40
 
 
 def collect(study: Any, folders: dict[str, list[Path]]) -> dict[str, Any]:
-    """The results of a `Study`, ready for JSON; of runs that have not ended, the curves so far."""
+    """The results of a `Study` from the runs of each variant, ready for JSON; of those under way, the curves so far."""
     variants: dict[str, Any] = {}
     for variant, found in folders.items():
-        kept = {folder.name.rpartition("-")[2]: _run(folder) for folder in found if (folder / runs.SCALARS).exists()}
+        kept = {folder.name.rpartition("-")[2]: _run(folder) for folder in found}
         variants[variant] = {"words": list(study.variants[variant]), "seeds": kept}
     first = next(folder for found in folders.values() for folder in found)
     return {
@@ -33,15 +33,21 @@ def collect(study: Any, folders: dict[str, list[Path]]) -> dict[str, Any]:
 
 
 def _run(folder: Path) -> dict[str, Any]:
-    scalars = read_scalars(folder)
+    scalars = read_scalars(folder / runs.SCALARS)
     samples = scalars["samples"]
     places = np.linspace(samples[0], samples[-1], _POINTS)
-    curves = {
-        name: [float(f"{value:.4g}") for value in np.interp(places, samples, smooth(scalars[name]))]
-        for name in ("seconds", *CURVES)
-    }
+    curves = {name: _curve(places, samples, smooth(scalars[name])) for name in ("seconds", *CURVES)}
     measured = runs.read_json(folder / runs.MEASURES, {}).get("trained", {})
     return {"samples": places.astype(int).tolist(), **curves, "measured": measured}
+
+
+def _curve(places: np.ndarray, samples: np.ndarray, values: np.ndarray) -> list[float | None]:
+    """The values at these places; None before there is one: no episode has ended yet."""
+    known = np.isfinite(values)
+    if not known.any():
+        return [None] * len(places)
+    found = np.interp(places, samples[known], values[known], left=np.nan, right=np.nan)
+    return [float(f"{value:.4g}") if np.isfinite(value) else None for value in found]
 
 
 def plot(results: dict[str, Any], path: Path) -> Path:
@@ -58,7 +64,7 @@ def plot(results: dict[str, Any], path: Path) -> Path:
                 continue
             least = min(seed["samples"][-1] for seed in seeds)
             places = np.linspace(0, least, _POINTS)
-            lines = [np.interp(places, seed["samples"], seed[name]) for seed in seeds]
+            lines = [np.interp(places, seed["samples"], np.array(seed[name], dtype=float)) for seed in seeds]
             for line in lines if len(lines) > 1 else ():
                 axes.plot(places / 1e6, line, color=f"C{number}", alpha=0.25, linewidth=0.8)
             axes.plot(places / 1e6, np.mean(lines, axis=0), color=f"C{number}", label=f"{variant} ({len(lines)})")

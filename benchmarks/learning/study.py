@@ -1,13 +1,16 @@
 """A learning study: one set of clips, some settings, some seeds. Runs what is missing and keeps the curves.
 
-    python benchmarks/learning/study.py gamma             # runs/learning/gamma/, docs/learning/gamma.json and .png
-    python benchmarks/learning/study.py gamma --seeds 1   # one seed first
+    python benchmarks/learning/study.py discount             # docs/learning/discount.json and discount.png
+    python benchmarks/learning/study.py discount --seeds 1   # one seed first
 
-A study is a file of `studies/`; its task is a line of `tasks.yaml`. Stop it at any time: the same command goes on.
+Its runs lie in runs/learning/discount/. A study is a file of `studies/`; its task is a line of `tasks.yaml`. Stop it at
+any time: the same command goes on.
 """
 
 import argparse
 import json
+import re
+import shutil
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -15,6 +18,8 @@ from pathlib import Path
 
 import yaml
 from results import collect, plot
+
+from murmillo.cli.runs import LAST, MEASURES, SCALARS
 
 HERE = Path(__file__).parent
 RUNS = Path("runs/learning")
@@ -42,15 +47,30 @@ class Study:
         """The words of one run, but for where it is kept."""
         return [*self.words, *self.variants[variant], f"seed={seed}"]
 
+    def folders(self, variant: str) -> list[Path]:
+        """Its runs that have made an iteration, by seed."""
+        logs = (RUNS / self.name).glob(f"*/{SCALARS}")
+        found = [log.parent for log in logs if re.fullmatch(rf"{re.escape(variant)}-\d+", log.parent.name)]
+        return sorted(found, key=seed_of)
+
+
+def seed_of(folder: Path) -> int:
+    """The seed of a run, the end of its name."""
+    return int(folder.name.rpartition("-")[2])
+
 
 def read(name: str) -> Study:
-    """The study of this name. Exits with a line where there is none."""
+    """The study of this name. Exits with a line where there is none, or its file has not what a study needs."""
     file = HERE / "studies" / f"{name}.yaml"
     if not file.is_file():
         known = ", ".join(sorted(path.stem for path in file.parent.glob("*.yaml")))
         sys.exit(f"study {name}: there is no such file in {file.parent}; there are: {known}")
-    content = yaml.safe_load(file.read_text(encoding="utf-8"))
+    content = yaml.safe_load(file.read_text(encoding="utf-8")) or {}
+    if missing := [key for key in ("question", "task", "samples", "variants") if not content.get(key)]:
+        sys.exit(f"{file}: {missing[0]} is missing; a study has question, task, samples and variants")
     tasks = yaml.safe_load((HERE / "tasks.yaml").read_text(encoding="utf-8"))
+    if content["task"] not in tasks:
+        sys.exit(f"{file}: task: {content['task']} is no line of tasks.yaml; there are: {', '.join(tasks)}")
     common = (
         *tasks[content["task"]],
         f"runner.samples={content['samples']}",
@@ -66,33 +86,47 @@ def run(study: Study, variant: str, seed: int) -> bool:
     name = f"{variant}-{seed}"
     folder = RUNS / study.name / name
     words = study.words_of(variant, seed)
-    asked = folder.with_suffix(".json")
-    if folder.exists() and json.loads(asked.read_text(encoding="utf-8")) != words:
+    asked = folder.with_name(f"{name}.json")
+    if folder.exists() and (not asked.exists() or json.loads(asked.read_text(encoding="utf-8")) != words):
         sys.exit(f"{folder}: was made with other settings; move it away, or give the variant another name")
-    if (folder / "measures.json").exists():
+    if (folder / MEASURES).exists():
         return True
     folder.parent.mkdir(parents=True, exist_ok=True)
-    if (folder / "checkpoints" / "last").exists():
+    if (folder / LAST).exists():
         words = [f"run.resume={folder}"]
     else:
+        shutil.rmtree(folder, ignore_errors=True)  # it ended before there was a checkpoint to go on from
         asked.write_text(json.dumps(words), encoding="utf-8")
         words += [f"run.root={folder.parent}", f"run.name={name}", "run.video=false", "run.evaluate=false"]
     print(f"{study.name}: {name}", flush=True)
-    done = subprocess.run([sys.executable, "-m", "murmillo.cli.main", "train", *words], check=False)
-    return done.returncode == 0 and (folder / "measures.json").exists()
+    return train(words) == 0 and (folder / MEASURES).exists()
 
 
-def main() -> None:
+def train(words: list[str]) -> int:
+    """The exit status of `murmillo train` with these words; Ctrl-C reaches it too, and it is let save what it has."""
+    with subprocess.Popen([sys.executable, "-m", "murmillo.cli.main", "train", *words]) as training:
+        try:
+            return training.wait()
+        except KeyboardInterrupt:
+            training.wait()
+            raise
+
+
+def main(words: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("name", help="of a file in studies/")
     parser.add_argument("--seeds", type=int, nargs="+", help="instead of the study's own")
-    asked = parser.parse_args()
+    asked = parser.parse_args(words)
     study = read(asked.name)
-    runs = [(variant, seed) for seed in asked.seeds or study.seeds for variant in study.variants]
-    ended = [run(study, variant, seed) for variant, seed in runs]
-    folders = {variant: sorted((RUNS / study.name).glob(f"{variant}-[0-9]*/")) for variant in study.variants}
+    try:
+        ended = [run(study, variant, seed) for seed in asked.seeds or study.seeds for variant in study.variants]
+    except KeyboardInterrupt:
+        sys.exit("stopped; the same command goes on")
+    folders = {variant: study.folders(variant) for variant in study.variants}
+    if not any(folders.values()):
+        sys.exit(f"study {study.name}: no run has made an iteration; what was wrong is said above")
     results = collect(study, folders)
-    RESULTS.mkdir(exist_ok=True)
+    RESULTS.mkdir(parents=True, exist_ok=True)
     file = RESULTS / f"{study.name}.json"
     file.write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
     print(f"{file}, {plot(results, file.with_suffix('.png'))}")

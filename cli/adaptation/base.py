@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from operator import attrgetter
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from murmillo.agents.adaptnet.base import Base
@@ -11,6 +10,7 @@ from murmillo.agents.common.errors import AgentError
 from murmillo.cli import foundations, runs
 from murmillo.cli.adaptation.words import AGENT, is_adaptnet_run
 from murmillo.cli.errors import CommandError
+from murmillo.cli.foundations import Foundation
 from murmillo.cli.tasks.words import choices_of
 from murmillo.envs import EnvConfig
 from murmillo.envs.character import Character
@@ -24,17 +24,13 @@ _SIZES = ("recurrent", "ppo.hidden")
 
 
 @dataclass(frozen=True)
-class BaseRun:
+class BaseRun(Foundation):
     """A run of `stage=base`.
 
     Attributes:
-        word: as the user named it.
-        folder: of the run.
         config: its settings.
     """
 
-    word: str
-    folder: Path
     config: "AdaptNetTrainConfig"
 
     def check_env(self, env: EnvConfig) -> None:

@@ -15,15 +15,9 @@ _LEAST = {
         "num_envs",
         "runner.horizon",
         "runner.samples",
-        "agent.recurrent",
-        "agent.ppo.minibatch",
-        "agent.ppo.epochs",
-        "agent.discriminator.recurrent",
-        "warm_start.pairs",
-        "warm_start.minibatch",
         "run.measured_worlds",
     ),
-    0: ("runner.max_minutes", "runner.checkpoint_minutes", "warm_start.steps"),
+    0: ("runner.max_minutes", "runner.checkpoint_minutes"),
 }
 """The least that these settings may be."""
 

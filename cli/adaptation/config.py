@@ -8,7 +8,6 @@ from typing import Any, Literal, get_args
 
 from hydra.core.config_store import ConfigStore
 from omegaconf import DictConfig, OmegaConf
-from omegaconf.errors import OmegaConfBaseException
 
 from murmillo.agents.adaptnet.config import AdaptNetConfig
 from murmillo.agents.common.runner import RunnerConfig
@@ -16,12 +15,11 @@ from murmillo.agents.common.warm_start import WarmStartConfig
 from murmillo.cli.adaptation import base as base_runs
 from murmillo.cli.adaptation.base import BaseRun
 from murmillo.cli.adaptation.words import AGENT
-from murmillo.cli.config import check_words, compose_words, merge, reading, resume, resumed_run
+from murmillo.cli.config import check_words, compose_words, merge, reading, resolved, resume, resumed_run
 from murmillo.cli.errors import CommandError, near_names
 from murmillo.cli.schema import build, twin_of
 from murmillo.cli.tasks.config import TaskRunConfig
 from murmillo.cli.tasks.words import value_of
-from murmillo.cli.translate import command_error
 from murmillo.envs import EnvConfig
 from murmillo.envs.registration import env_config
 from murmillo.envs.tasks.navigate import Navigate, NavigateConfig
@@ -159,9 +157,5 @@ def _defaults(base: BaseRun | None) -> AdaptNetTrainConfig:
 
 
 def _typed(composed: DictConfig, choices: Mapping[str, Any]) -> AdaptNetTrainConfig:
-    try:
-        values: Any = OmegaConf.to_container(composed, resolve=True, throw_on_missing=True, enum_to_str=True)
-    except OmegaConfBaseException as error:
-        raise command_error(error, composed) from None
     chosen = {str(group): str(choice) for group, choice in choices.items()}
-    return build(AdaptNetTrainConfig, {**values, "choices": chosen})
+    return build(AdaptNetTrainConfig, {**resolved(composed), "choices": chosen})

@@ -2,8 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-
-from murmillo.cli.errors import CommandError
+from typing import Any
 
 
 @dataclass
@@ -20,20 +19,15 @@ class AdaptNetEvaluateConfig:
 def run(words: list[str]) -> int:
     """Measure, keep and print the figures, and write the report anew."""
     from murmillo.cli import config as configuration
-    from murmillo.cli import runs, tables
     from murmillo.cli.adaptation import report
     from murmillo.cli.adaptation.evaluating import evaluate
     from murmillo.cli.adaptation.world import open_run
-    from murmillo.cli.seeds import check_seed
-    from murmillo.cli.tasks import table
+    from murmillo.cli.tasks.evaluate import answer
 
     settings = configuration.parse(AdaptNetEvaluateConfig, words)
-    if settings.worlds < 1:
-        raise CommandError(f"worlds={settings.worlds}: needs at least 1 episode")
-    check_seed("seed", settings.seed)
-    folder = Path(settings.run)
-    config, base = open_run(folder, settings.base, settings.motions)
-    results = evaluate(config, base, folder, settings.worlds, settings.seed)
-    tables.show(table.columns(results), table.rows(results, spread=False), left=("",))
-    print(f"the report: {report.write(folder)} (and {runs.METRICS})")
-    return 0
+
+    def measured(folder: Path) -> dict[str, Any]:
+        config, base = open_run(folder, settings.base, settings.motions)
+        return evaluate(config, base, folder, settings.worlds, settings.seed)
+
+    return answer(settings, measured, report.write)

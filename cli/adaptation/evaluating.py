@@ -9,9 +9,8 @@ from murmillo.cli.adaptation.base import BaseRun
 from murmillo.cli.adaptation.config import AdaptNetTrainConfig
 from murmillo.cli.adaptation.measuring import measure
 from murmillo.cli.adaptation.world import check_base
-from murmillo.cli.evaluation.identity import checkpoint_digest
 from murmillo.cli.tasks import table
-from murmillo.cli.tasks.evaluating import SEED
+from murmillo.cli.tasks.evaluating import PROTOCOL, SEED, keep
 
 
 def evaluate(
@@ -28,24 +27,6 @@ def evaluate(
     """
     saved = checkpoint.load(folder / runs.LAST)
     check_base(base, saved)
-    results = {
-        "run": folder.name,
-        "task": "navigate",
-        "agent": config.choices["agent"],
-        "samples": int(saved.get("samples", 0)),
-        "checkpoint": checkpoint_digest(folder / runs.LAST),
-        "trajectories": worlds,
-        "seed": seed,
-        "start": "as in training",
-        "not_comparable": None,
-        "metrics": {
-            "task": {
-                "title": "Goal and style",
-                "protocols": ["one episode a world, mean actions"],
-                "figures": table.entries(measure(config, base, folder, worlds, seed)),
-            }
-        },
-    }
-    (folder / runs.EVALUATION).mkdir(exist_ok=True)
-    runs.write_json(folder / runs.METRICS, results)
-    return results
+    figures = table.entries(measure(config, base, folder, worlds, seed))
+    metrics = {"task": {"title": "Goal and style", "protocols": [PROTOCOL], "figures": figures}}
+    return keep(folder, saved, "navigate", config.choices["agent"], worlds, seed, metrics)

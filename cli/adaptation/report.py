@@ -19,32 +19,20 @@ def write(folder: Path) -> Path:
     scalars = common.read_scalars(folder / runs.SCALARS)
     config = OmegaConf.load(folder / runs.CONFIG)
     clips = list(runs.read_json(folder / runs.CLIPS, {}))
-    sections = [
-        f"# {folder.name}",
-        _what(config, runs.read_json(folder / runs.VERSIONS, {}), scalars),
-        common.terms(runs.read_json(folder / runs.TERMS)),
-        common.film(folder),
-        common.notices(runs.read_json(folder / runs.NOTICES, [])),
-        _figures(config, runs.read_json(folder / runs.METRICS), clips),
-    ]
-    if len(scalars["samples"]):
-        curve = plots.plot_learning(scalars, 1, folder / runs.PLOTS, CURVES)
-        sections += [
-            common.first_and_last(scalars, TRAINING),
-            common.minutes(scalars, TRAINING),
-            common.pictures([curve], folder),
-        ]
-    sections += [common.meanings(scalars, TRAINING), _going_on(folder, config, scalars)]
-    path = folder / runs.REPORT
-    runs.write_text(path, "\n\n".join(section for section in sections if section) + "\n")
-    return path
+    return common.assemble(
+        folder,
+        scalars,
+        what=_what(config, scalars),
+        found=[_figures(config, runs.read_json(folder / runs.METRICS), clips)],
+        draw=lambda: [plots.plot_learning(scalars, 1, folder / runs.PLOTS, CURVES)],
+        going_on=_going_on(folder, config, scalars),
+        metrics=TRAINING,
+    )
 
 
-def _what(config: Any, versions: dict[str, Any], scalars: Scalars) -> str:
+def _what(config: Any, scalars: Scalars) -> str:
     choices = config.choices
-    samples = int(scalars["samples"][-1]) if len(scalars["samples"]) else 0
-    minutes = scalars["seconds"][-1] / 60.0 if samples else 0.0
-    rate = samples / (60.0 * minutes) if minutes else 0.0
+    samples, minutes, rate = common.Effort.of(scalars)
     clips = f"`{config.motions}`" + (f" ({', '.join(config.clips)})" if config.clips else "")
     ablation = "" if choices.ablation == "none" else f" with the ablation `{choices.ablation}`"
     what = (
@@ -56,7 +44,7 @@ def _what(config: Any, versions: dict[str, Any], scalars: Scalars) -> str:
     return (
         f"{what}, with the budget `{choices.budget}`, seed {config.seed}: {samples:,} samples (control steps of "
         f"1/30 s, {samples / 30 / 3600:.1f} simulated hours) in {minutes:.1f} minutes, {rate:,.0f} samples/s, in "
-        f"{config.num_envs} worlds.\n\n{common.made_on(versions)}"
+        f"{config.num_envs} worlds."
     )
 
 
@@ -95,7 +83,7 @@ def _published(results: dict[str, Any], clips: list[str]) -> str:
 
 
 def _going_on(folder: Path, config: Any, scalars: Scalars) -> str:
-    samples = int(scalars["samples"][-1]) if len(scalars["samples"]) else 0
+    samples = common.Effort.of(scalars).samples
     run = shlex.quote(str(folder))
     lines = [
         "# train this run on, for an hour at most",

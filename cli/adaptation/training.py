@@ -1,7 +1,7 @@
 """One run of AdaptNet from its settings to its report: build, train, measure, film, report."""
 
-import dataclasses
 from pathlib import Path
+from typing import Any
 
 import torch
 
@@ -21,12 +21,10 @@ from murmillo.cli.adaptation.config import AdaptNetTrainConfig
 from murmillo.cli.adaptation.evaluating import evaluate
 from murmillo.cli.adaptation.metrics import TRAINING
 from murmillo.cli.adaptation.world import agent_meta, check_base, make_agent, make_env
-from murmillo.cli.evaluation.identity import clip_digests
 from murmillo.cli.progress import Progress
-from murmillo.cli.tasks import table
-from murmillo.cli.training import describe, film, follow, undone_by_mistakes
+from murmillo.cli.tasks.training import complete, note_clips
+from murmillo.cli.training import describe, follow, undone_by_mistakes
 from murmillo.envs import HumanoidVectorEnv
-from murmillo.envs.motion.licences import terms_of
 
 
 def train(config: AdaptNetTrainConfig, suffix: str = "") -> int:
@@ -72,24 +70,20 @@ def _train(
     if resuming:
         runner.load(folder / runs.LAST)
     # after loading: they are kept with a checkpoint, and need not be those here
-    terms = dataclasses.asdict(terms_of(env.library.clips))
-    runner.meta |= {"terms": terms, **foundations.identity(SETTING, base and base.folder)}
-    runs.write_json(folder / runs.TERMS, terms)
-    runs.write_json(folder / runs.CLIPS, clip_digests(env.library.clips))
+    runner.meta |= foundations.identity(SETTING, base and base.folder)
+    note_clips(folder, runner, env)
     what = "a base" if base is None else f"{base.word} to {config.choices['to']} by {config.choices['method']}"
 
     def begin(progress: Progress) -> None:
         if not resuming and config.warm_start.steps:
             _warm_start(config, agent, env, generator, progress)
 
-    if follow(runner, folder, f"{folder}: {what}, {config.num_envs} worlds", metrics=TRAINING, begin=begin):
-        for name in (runs.MEASURES, runs.METRICS):  # of this run when it had ended before: no longer its figures
-            (folder / name).unlink(missing_ok=True)
-        report.write(folder)
-        print(f"stopped at {runner.samples:,} samples; go on with: murmillo train run.resume={folder}")
-        return 0
-    _finish(config, base, folder)
-    return 0
+    def measured() -> dict[str, Any]:
+        return evaluate(config, base, folder, config.run.measured_worlds)
+
+    opening = f"{folder}: {what}, {config.num_envs} worlds"
+    stopped = follow(runner, folder, opening, metrics=TRAINING, begin=begin)
+    return complete(folder, runner.samples if stopped else None, measured, report.write, video=config.run.video)
 
 
 def _warm_start(
@@ -109,13 +103,3 @@ def _warm_start(
     progress.say(f"warm start: {config.warm_start.steps} steps on the clips' own next poses")
     losses = warm_start(agent.model, env.demonstrations.imitation_pairs, config.warm_start, generator, told)
     progress.say(f"warm start: squared error of the action from {losses[0]:.4f} to {losses[-1]:.4f}")
-
-
-def _finish(config: AdaptNetTrainConfig, base: BaseRun | None, folder: Path) -> None:
-    """Measure the policy beside the one that training began with, film it, write the report."""
-    print("measuring the policy before and after training", flush=True)
-    results = evaluate(config, base, folder, config.run.measured_worlds)
-    runs.write_json(folder / runs.MEASURES, table.by_player(results))
-    if config.run.video:
-        film(folder)
-    print(f"the report: {report.write(folder)}")

@@ -16,8 +16,6 @@ _LEAST = {
         "num_envs",
         "runner.horizon",
         "runner.samples",
-        "agent.ppo.minibatch",
-        "agent.ppo.epochs",
         "run.measured_worlds",
     ),
     0: ("runner.max_minutes", "runner.checkpoint_minutes"),

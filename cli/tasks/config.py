@@ -8,21 +8,19 @@ from typing import Any
 
 from hydra.core.config_store import ConfigStore
 from omegaconf import DictConfig, OmegaConf
-from omegaconf.errors import OmegaConfBaseException
 
 from murmillo.agents.calm.precision import PrecisionConfig
 from murmillo.agents.case.high_level import HybridConfig
 from murmillo.agents.common.latent_env import LatentEnvConfig
 from murmillo.agents.common.runner import RunnerConfig
 from murmillo.cli.agents import AGENTS
-from murmillo.cli.config import check_words, compose_words, merge, reading, resume, resumed_run
+from murmillo.cli.config import check_words, compose_words, merge, reading, resolved, resume, resumed_run
 from murmillo.cli.errors import CommandError
 from murmillo.cli.schema import build, twin_of
 from murmillo.cli.tasks import low as low_runs
 from murmillo.cli.tasks.low import NONE, SCRATCH, LowRun
 from murmillo.cli.tasks.names import commands_skills, task_class, task_names
 from murmillo.cli.tasks.words import value_of
-from murmillo.cli.translate import command_error
 from murmillo.envs import EnvConfig
 from murmillo.envs.starts import StartConfig
 from murmillo.envs.tasks import Task
@@ -163,11 +161,8 @@ def _defaults(task: str, below: LowRun | None) -> TaskTrainConfig:
 
 
 def _typed(composed: DictConfig, choices: Mapping[str, Any]) -> TaskTrainConfig:
-    try:
-        values: Any = OmegaConf.to_container(composed, resolve=True, throw_on_missing=True, enum_to_str=True)
-    except OmegaConfBaseException as error:
-        raise command_error(error, composed) from None
     chosen = {str(group): str(choice) for group, choice in choices.items()}
     arguments: Any = task_class(chosen["task"]).config_type
+    values = resolved(composed)
     values["task"] = build(arguments, values["task"], "task.")
     return build(TaskTrainConfig, {**values, "choices": chosen})

@@ -1,5 +1,6 @@
 """The figures of a run that learned a task, in `evaluation/metrics.json`, where `murmillo compare` reads them."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from murmillo.cli.tasks.low import LowRun
 from murmillo.cli.tasks.measuring import Measured, measure
 
 SEED = 12345
+PROTOCOL = "one episode a world, mean actions"
 
 
 def evaluate(
@@ -29,27 +31,40 @@ def evaluate(
     saved = checkpoint.load(folder / runs.LAST)
     low.check_unchanged(below, saved)
     measured = measure(config, below, folder / runs.LAST, worlds, seed)
-    protocols = ["one episode a world, mean actions"]
+    protocols = [PROTOCOL]
     if config.commands_styles:
         protocols.append("one style an episode")
+    metrics = {
+        "task": {"title": "The task", "protocols": protocols, "figures": table.entries(measured.all)},
+        **_styles(measured, protocols),
+    }
+    return keep(folder, saved, config.choices["task"], config.choices["agent"], worlds, seed, metrics)
+
+
+def keep(
+    folder: Path, saved: Mapping[str, Any], task: str, agent: str, worlds: int, seed: int, metrics: dict[str, Any]
+) -> dict[str, Any]:
+    """Write `evaluation/metrics.json`, and return what it has.
+
+    Args:
+        folder: of the run.
+        saved: content of its checkpoint.
+        task, agent: their names.
+        worlds: episodes that were measured.
+        seed: of them.
+        metrics: what was found, by metric.
+    """
     results = {
         "run": folder.name,
-        "task": config.choices["task"],
-        "agent": config.choices["agent"],
+        "task": task,
+        "agent": agent,
         "samples": int(saved.get("samples", 0)),
         "checkpoint": checkpoint_digest(folder / runs.LAST),
         "trajectories": worlds,
         "seed": seed,
         "start": "as in training",
         "not_comparable": None,
-        "metrics": {
-            "task": {
-                "title": "The task",
-                "protocols": protocols,
-                "figures": table.entries(measured.all),
-            },
-            **_styles(measured, protocols),
-        },
+        "metrics": metrics,
     }
     (folder / runs.EVALUATION).mkdir(exist_ok=True)
     runs.write_json(folder / runs.METRICS, results)

@@ -12,6 +12,7 @@ from murmillo.cli.agents import load_player
 from murmillo.cli.config import TrainConfig
 from murmillo.cli.errors import CommandError
 from murmillo.cli.evaluation.identity import checkpoint_digest
+from murmillo.cli.foundations import Foundation
 from murmillo.cli.tasks.words import is_task_run
 from murmillo.envs import EnvConfig, HumanoidVectorEnv
 
@@ -26,17 +27,13 @@ _ITS_OWN = ("character", "window", "residual_force", "residual_reward")
 
 
 @dataclass(frozen=True)
-class LowRun:
+class LowRun(Foundation):
     """A run whose policy is followed.
 
     Attributes:
-        word: as the user named it.
-        folder: of the run.
         config: its settings.
     """
 
-    word: str
-    folder: Path
     config: TrainConfig
 
     @property

@@ -19,33 +19,20 @@ def write(folder: Path) -> Path:
     """Write the report and its plots from what lies in the run's folder; the report's path."""
     scalars = common.read_scalars(folder / runs.SCALARS)
     config = OmegaConf.load(folder / runs.CONFIG)
-    metrics = training_metrics(config.latent_env.steps)
-    sections = [
-        f"# {folder.name}",
-        _what(config, runs.read_json(folder / runs.VERSIONS, {}), scalars),
-        common.terms(runs.read_json(folder / runs.TERMS)),
-        common.film(folder),
-        common.notices(runs.read_json(folder / runs.NOTICES, [])),
-        _figures(config, runs.read_json(folder / runs.METRICS)),
-    ]
-    if len(scalars["samples"]):
-        curve = plots.plot_learning(scalars, config.latent_env.steps, folder / runs.PLOTS)
-        sections += [
-            common.first_and_last(scalars, metrics),
-            common.minutes(scalars, metrics),
-            common.pictures([curve], folder),
-        ]
-    sections += [common.meanings(scalars, metrics), _going_on(folder, config, scalars)]
-    path = folder / runs.REPORT
-    runs.write_text(path, "\n\n".join(section for section in sections if section) + "\n")
-    return path
+    return common.assemble(
+        folder,
+        scalars,
+        what=_what(config, scalars),
+        found=[_figures(config, runs.read_json(folder / runs.METRICS))],
+        draw=lambda: [plots.plot_learning(scalars, config.latent_env.steps, folder / runs.PLOTS)],
+        going_on=_going_on(folder, config, scalars),
+        metrics=training_metrics(config.latent_env.steps),
+    )
 
 
-def _what(config: Any, versions: dict[str, Any], scalars: Scalars) -> str:
+def _what(config: Any, scalars: Scalars) -> str:
     choices, steps = config.choices, config.latent_env.steps
-    samples = int(scalars["samples"][-1]) if len(scalars["samples"]) else 0
-    minutes = scalars["seconds"][-1] / 60.0 if samples else 0.0
-    rate = samples / (60.0 * minutes) if minutes else 0.0
+    samples, minutes, rate = common.Effort.of(scalars)
     how = (
         'acting on the character\'s own action, with no policy below ("Scratch")'
         if config.low == NONE
@@ -55,7 +42,7 @@ def _what(config: Any, versions: dict[str, Any], scalars: Scalars) -> str:
     return (
         f"A policy learned the task `{choices.task}` {how}, with the budget `{choices.budget}`, seed {config.seed}: "
         f"{samples:,} samples ({unit}, {samples * steps / 30 / 3600:.1f} simulated hours) in {minutes:.1f} minutes, "
-        f"{rate:,.0f} samples/s, in {config.num_envs} worlds.\n\n{common.made_on(versions)}"
+        f"{rate:,.0f} samples/s, in {config.num_envs} worlds."
     )
 
 
@@ -85,7 +72,7 @@ def _figures(config: Any, results: dict[str, Any] | None) -> str:
 
 
 def _going_on(folder: Path, config: Any, scalars: Scalars) -> str:
-    samples = int(scalars["samples"][-1]) if len(scalars["samples"]) else 0
+    samples = common.Effort.of(scalars).samples
     run = shlex.quote(str(folder))
     lines = [
         "# train this run on, for an hour at most",

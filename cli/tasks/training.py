@@ -1,6 +1,7 @@
 """One run of a task from its settings to its report: build, train, measure, film, report."""
 
 import dataclasses
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from murmillo.cli.tasks.low import LowRun
 from murmillo.cli.tasks.metrics import training_metrics
 from murmillo.cli.tasks.world import World, make_policy, policy_meta
 from murmillo.cli.training import describe, film, follow, undone_by_mistakes
+from murmillo.envs import HumanoidVectorEnv
 from murmillo.envs.motion.licences import terms_of
 
 
@@ -59,27 +61,55 @@ def _train(config: TaskTrainConfig, below: LowRun | None, world: World, folder: 
     if resuming:
         runner.load(folder / runs.LAST)
     # after loading: they are kept with a checkpoint, and need not be those here
-    terms = dataclasses.asdict(terms_of(world.env.library.clips))
-    runner.meta |= {"terms": terms, **low.identity(below)}
-    runs.write_json(folder / runs.TERMS, terms)
-    runs.write_json(folder / runs.CLIPS, clip_digests(world.env.library.clips))
+    runner.meta |= low.identity(below)
+    note_clips(folder, runner, world.env)
     over = "on its own" if below is None else f"over {below.word} ({below.kind})"
     opening = f"{folder}: {config.choices['task']} {over}, {config.num_envs} worlds"
-    if follow(runner, folder, opening, metrics=training_metrics(config.latent_env.steps)):
+    stopped = follow(runner, folder, opening, metrics=training_metrics(config.latent_env.steps))
+
+    def measured() -> dict[str, Any]:
+        return evaluate(config, below, folder, config.run.measured_worlds)
+
+    return complete(folder, runner.samples if stopped else None, measured, report.write, video=config.run.video)
+
+
+def complete(
+    folder: Path,
+    stopped: int | None,
+    measured: Callable[[], dict[str, Any]],
+    write: Callable[[Path], Path],
+    *,
+    video: bool,
+) -> int:
+    """What comes after the training of a run: measure its policy, film it, report; of one that was stopped the report.
+
+    Args:
+        folder: of the run.
+        stopped: samples at which a signal ended it; None where it was trained to its end.
+        measured: what `evaluation/metrics.json` has.
+        write: writes the report.
+        video: film it.
+
+    Returns:
+        the exit status.
+    """
+    if stopped is not None:
         for name in (runs.MEASURES, runs.METRICS):  # of this run when it had ended before: no longer its figures
             (folder / name).unlink(missing_ok=True)
-        report.write(folder)
-        print(f"stopped at {runner.samples:,} samples; go on with: murmillo train run.resume={folder}")
+        write(folder)
+        print(f"stopped at {stopped:,} samples; go on with: murmillo train run.resume={folder}")
         return 0
-    _finish(config, below, folder)
+    print("measuring the policy before and after training", flush=True)
+    runs.write_json(folder / runs.MEASURES, table.by_player(measured()))
+    if video:
+        film(folder)
+    print(f"the report: {write(folder)}")
     return 0
 
 
-def _finish(config: TaskTrainConfig, below: LowRun | None, folder: Path) -> None:
-    """Measure the policy beside what it is to be better than, film it, write the report."""
-    print("measuring the policy before and after training", flush=True)
-    results: dict[str, Any] = evaluate(config, below, folder, config.run.measured_worlds)
-    runs.write_json(folder / runs.MEASURES, table.by_player(results))
-    if config.run.video:
-        film(folder)
-    print(f"the report: {report.write(folder)}")
+def note_clips(folder: Path, runner: Runner, env: HumanoidVectorEnv) -> None:
+    """Keep under which terms the clips stand, with the checkpoint too, and which they are."""
+    terms = dataclasses.asdict(terms_of(env.library.clips))
+    runner.meta["terms"] = terms
+    runs.write_json(folder / runs.TERMS, terms)
+    runs.write_json(folder / runs.CLIPS, clip_digests(env.library.clips))

@@ -1,3 +1,4 @@
+import math
 from pathlib import Path
 
 import pytest
@@ -93,6 +94,13 @@ def test_only_valid_frames_are_normalised_by(tmp_path: Path) -> None:
     assert normalizer.count == rollout["length"].sum()
     valid = torch.cat([s[:n] for s, n in zip(rollout.flat("state"), rollout.flat("length"), strict=True)])
     torch.testing.assert_close(normalizer.mean, valid.double().mean(0))
+
+
+def test_the_critic_learns_returns_in_units_that_know_them(tmp_path: Path) -> None:
+    runner = toy_runner(tmp_path, Wanderer(32), 1)
+    targets = runner.agent.model.targets(step(runner))  # type: ignore[attr-defined]
+    torch.testing.assert_close(targets.mean(0), torch.zeros(2), atol=1e-4, rtol=0)
+    torch.testing.assert_close(targets.std(0, correction=0), torch.ones(2), atol=1e-2, rtol=0)
 
 
 def test_only_what_is_new_learns(tmp_path: Path) -> None:
@@ -196,6 +204,9 @@ def test_what_does_not_fit_is_refused_in_one_line(generator: torch.Generator) ->
         (r"agent\.window=4: the environment's windows are \[3, 2\]", {"window": 4}, Wanderer(3), None),
         (r"agent\.method=magic is not one of adaptnet, finetune, progressive", {"method": "magic"}, Wanderer(3), None),
         (r"agent\.weight_decay=-1: a penalty is 0 or more", {"weight_decay": -1}, Wanderer(3), None),
+        (r"agent\.injection_penalty=nan: a penalty is 0 or more", {"injection_penalty": math.nan}, Wanderer(3), None),
+        (r"agent\.popart=0: needs a share above 0", {"popart": 0}, Wanderer(3), None),
+        ("the base acts by a map of heights, the environment shows none", {}, Wanderer(3), make_base(heights=True)),
         ("the checkpoint's base policy differs from the config's", {"recurrent": 8}, Wanderer(3), make_base()),
     ]
     for line, changes, env, base in cases:

@@ -57,6 +57,8 @@ def test_a_goal_and_a_map_change_what_is_done(generator: torch.Generator) -> Non
     assert len({round(value.item(), 6) for value in values[:, 0]}) == 3
     stacked = critic(state.expand(2, 3, 4, 3), {name: value.expand(2, *value.shape) for name, value in told.items()})
     torch.testing.assert_close(stacked, values.expand(2, 3, 2))
+    # of several views of a state it looks at the last, which learns on
+    assert torch.equal(critic(torch.cat([torch.randn(3, 4, 3, generator=generator), state], -1), told), values)
 
 
 def test_popart_by_hand() -> None:

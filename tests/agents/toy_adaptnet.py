@@ -1,5 +1,6 @@
 """A toy with AdaptNet's observations, and a small AdaptNet for it."""
 
+import dataclasses
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,6 @@ from murmillo.agents.adaptnet.agent import AdaptNet
 from murmillo.agents.adaptnet.base import Base
 from murmillo.agents.adaptnet.config import AdaptNetConfig
 from murmillo.agents.adaptnet.ensemble import EnsembleConfig
-from murmillo.agents.common.ppo import PPOConfig
 from murmillo.agents.common.runner import Runner, RunnerConfig
 from tests.agents.toy_tasks import Heading
 
@@ -66,18 +66,9 @@ class Wanderer(Heading):
 
 def small_adaptnet(**changes: Any) -> AdaptNetConfig:
     """AdaptNet with networks and steps that fit the toy."""
-    ppo = PPOConfig(
-        hidden=(32, 32),
-        style_hidden=(),
-        std=0.1,
-        policy_learning_rate=3e-3,
-        value_learning_rate=3e-3,
-        epochs=2,
-        minibatch=128,
-        bound_weight=0.0,
-        value_weight=0.5,
-        max_grad_norm=1.0,
-    )
+    sizes: dict[str, Any] = {"hidden": (32, 32), "epochs": 2, "minibatch": 128}
+    steps: dict[str, Any] = {"std": 0.1, "policy_learning_rate": 3e-3, "value_learning_rate": 3e-3}
+    ppo = dataclasses.replace(AdaptNetConfig().ppo, **sizes, **steps)
     discriminator = EnsembleConfig(recurrent=16, hidden=(32, 16), heads=8, learning_rate=1e-3, minibatch=256)
     fields = {"window": 3, "recurrent": 16, "ppo": ppo, "discriminator": discriminator}
     return AdaptNetConfig(**{**fields, **changes})
