@@ -1,6 +1,7 @@
 """Combinations of settings that cannot be, refused before anything is made."""
 
 import dataclasses
+import math
 from collections.abc import Iterator, Mapping
 from operator import attrgetter
 from typing import Any
@@ -63,6 +64,9 @@ def check_training(config: Any, at_least: Mapping[int, tuple[str, ...]]) -> None
     for name in ("runner.gamma", "runner.lam"):
         if not 0.0 <= (value := attrgetter(name)(config)) <= 1.0:
             raise CommandError(f"{name}={value}: needs a number from 0 to 1")
+    for name, weight in config.runner.reward_weights.items():
+        if not math.isfinite(weight):
+            raise CommandError(f"runner.reward_weights.{name}={weight}: needs a finite number")
     for name, widths in _hidden("agent", config.agent):
         if any(width < 1 for width in widths) or not (widths or name.endswith("style_hidden")):
             raise CommandError(f"{name}=[{','.join(map(str, widths))}]: needs a width of at least 1 for each layer")

@@ -127,7 +127,7 @@ def _open_task(folder: Path, settings: TaskPlayConfig) -> "Session":
     world = World(config, below, 1)
     policy = load_policy(config, world, folder / runs.LAST)
     decisions = world.decisions if isinstance(world.decisions, LatentEnv) else None
-    return Session(world.env, PolicyPilot(policy, decisions), fall, settings.seed)
+    return Session(world.env, PolicyPilot(policy, decisions), fall, settings.seed, world.skill_weights)
 
 
 def _check_address(host: str, port: int) -> None:
@@ -138,9 +138,18 @@ def _check_address(host: str, port: int) -> None:
     """
     if not 1 <= port <= 65535:
         raise CommandError(f"port={port}: needs a number from 1 to 65535")
+    if (reason := _why_not(host, port)) is not None:
+        raise CommandError(f"port={port}: cannot be listened at on host={host} ({reason}); choose another")
+
+
+def _why_not(host: str, port: int) -> str | None:
+    """What keeps this machine from listening there; None where nothing does."""
+    try:
+        socket.getaddrinfo(host, port, socket.AF_INET)
+    except (socket.gaierror, UnicodeError):
+        return "there is no such IPv4 address"
     try:
         with socket.create_server((host, port)):
-            pass
+            return None
     except OSError as error:
-        reason = error.strerror if isinstance(error, socket.gaierror) else os.strerror(error.errno or 0)
-        raise CommandError(f"port={port}: cannot be listened at on host={host} ({reason}); choose another") from None
+        return os.strerror(error.errno or 0)

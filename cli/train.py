@@ -38,8 +38,8 @@ Settings are written name=value. The first ones:
 
 With task=… a high-level policy learns to choose what the agent of another run does; its first settings:
 
-  task       reach, speed, steering, location, direction, relocation, path_follow, strike, block or recovery;
-             its arguments are task.radius=5 and the like (docs/tasks.md)
+  task       reach, speed, steering, location, direction, relocation, path_follow, strike, block, recovery or
+             navigate; its arguments are task.radius=5 and the like (docs/tasks.md)
   low        folder of a run of ase, case or calm, whose clips and character it takes over; or none
   precision  over a run of calm, where the task commands skills: precision.skills=[run_forward,crouch_walk] are the
              styles of CALM's precision training

@@ -31,6 +31,8 @@ def command_error(error: Exception, known: DictConfig | None) -> CommandError:
         return CommandError(f"{cause.full_key}: there is no such setting; {hint}")
     if isinstance(cause, OmegaConfBaseException) and cause.full_key:
         reason = _first_line(cause).rstrip(".")
+        if reason.startswith("Incompatible value 'None'"):
+            return CommandError(f"{cause.full_key}=: needs a value{_example(str(cause.full_key), known)}")
         if "is not a subclass of" in reason:
             return CommandError(f"{cause.full_key}: this is a group of settings; set one of them, {cause.full_key}.…=…")
         return CommandError(

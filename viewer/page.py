@@ -46,6 +46,7 @@ class Page:
         self._gui, self._session, self._loop, self._scene = server.gui, session, loop, scene
         self._frames = 0
         self._sliders: dict[str, Any] = {}
+        self._followed: dict[str, float] = {}
         self._gui.configure_theme(show_share_button=False, show_logo=False, dark_mode=False, brand_color=(140, 26, 26))
         self._gui.set_panel_label(title)
         self._status = self._gui.add_markdown("")
@@ -171,12 +172,17 @@ class Page:
         return math.atan2(y, x)
 
     def _follow_goals(self) -> None:
-        """Let the sliders show what holds, whoever has set it."""
+        """Let the sliders show what holds, whoever has set it.
+
+        Where it has not changed, a slider stays as it is: a user may have moved it, and the command be on its way.
+        """
         for name, slider in self._sliders.items():
             goals = self._session.goals
             value = goals.now(name).item() if name == SPEED else math.degrees(self._angle(name))
             shown = min(max(round(value / slider.step) * slider.step, slider.min), slider.max)
-            if abs(shown - slider.value) > 0.5 * slider.step:
+            changed = self._followed.get(name) != shown
+            self._followed[name] = shown
+            if changed and abs(shown - slider.value) > 0.5 * slider.step:
                 slider.value = shown
 
     # --- bindings -----------------------------------------------------------------------------------------------------

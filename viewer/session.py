@@ -80,33 +80,38 @@ class Session:
     Equal arguments and equal commands at equal steps give equal frames.
 
     Attributes:
-        skills: labels that can be commanded; empty where nobody heeds them.
+        skills: labels that can be commanded, which are those that chance may draw; empty where nobody heeds them.
         latents: to be chosen by the user; None where a policy chooses.
         goals: to be set by the user.
         plays_freely: there is no task, and so no goal.
         stay_down: leave a fallen character where it lies, instead of beginning a new episode.
     """
 
-    def __init__(self, env: HumanoidVectorEnv, pilot: Pilot, fall: FallConfig, seed: int) -> None:
+    def __init__(
+        self, env: HumanoidVectorEnv, pilot: Pilot, fall: FallConfig, seed: int, chance: torch.Tensor | None = None
+    ) -> None:
         """
         Args:
             env: one world, with the settings that `playable` gives.
             pilot: acts in it.
             fall: what a fall is.
             seed: of all that is drawn.
+            chance: `[K]` probabilities of the skills where the user commands none; None draws all alike.
         """
         self.env = env
-        self.skills = env.skills if pilot.heeds_skill else ()
+        known = [name for k, name in enumerate(env.skills) if chance is None or chance[k] > 0]
+        self.skills = tuple(known) if pilot.heeds_skill else ()
         self.latents = None if pilot.steerable is None else Latents(pilot.steerable, env.library)
         self.goals = Goals(env, torch.Generator().manual_seed(seed))
         self.plays_freely = isinstance(env.task, Imitation)
         self.stay_down = False
         self._pilot = pilot
+        self._chance = chance
         self._has_fallen = FallDetector(env.character, fall)
         self._row = Rollout(1, 1)
-        self._skill: str | None = None
         self._push_w, self._push_left = torch.zeros(1, 3, dtype=torch.float64), 0
         self._falls = 0
+        self.command_skill(None)
         self.reset(seed)
 
     # --- commands -----------------------------------------------------------------------------------------------------
@@ -123,13 +128,12 @@ class Session:
         Raises:
             SuiteError: there is none of that name.
         """
-        weights = None
+        weights = self._chance
         if skill is not None:
             self.env.set_skill(skill)
             # what an episode begins with, and what a task's clock draws
             weights = torch.tensor([float(name == skill) for name in self.env.skills])
         self.env.set_skill_weights(weights)
-        self._skill = skill
 
     def push(self, angle: float, force: float) -> None:
         """Push the root for 0.2 s.
@@ -176,7 +180,7 @@ class Session:
         label = int(self.env.observation()["skill"][0])
         status = Status(
             seconds=self._steps * CONTROL_DT,
-            skill=self.skills[label] if self.skills else None,
+            skill=self.env.skills[label] if self.skills else None,
             height=float(pose_w[0, 2]),
             speed=state.qvel[0, :2].norm().item(),
             falls=self._falls,

@@ -29,6 +29,7 @@ class World:
     Attributes:
         env: the task's environment, a control step at a time.
         decisions: what the policy acts in: decisions over the low-level policy, or `env` itself where there is none.
+        skill_weights: `[K]` probabilities of the skills that are commanded; None where all are alike.
     """
 
     def __init__(
@@ -58,8 +59,9 @@ class World:
         try:
             self.hybrid = config.choices["agent"] == "case" and not self.env.task.skill_steps
             self._observers: list[OnStep] = []
-            if config.commands_styles:
-                self.env.set_skill_weights(style_weights(config.precision.skills, self.env.library))
+            styles = config.precision.skills
+            self.skill_weights = style_weights(styles, self.env.library) if config.commands_styles else None
+            self.env.set_skill_weights(self.skill_weights)
             self.decisions: VectorEnv = self.env
             if below is not None:
                 low = below.load(self.env)

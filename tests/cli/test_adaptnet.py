@@ -29,7 +29,7 @@ from murmillo.envs.character import load_character
 from murmillo.envs.motion import load_clips, save_clips
 from murmillo.envs.motion.editing import trim
 from tests.cli.refusals import assert_refused
-from tests.cli.tiny_tasks import rows
+from tests.cli.running import rows
 
 Murmillo = Callable[..., tuple[int, str, str]]
 

@@ -21,7 +21,8 @@ from murmillo.cli.tasks.checks import check_settings
 from murmillo.cli.tasks.config import compose_task
 from murmillo.cli.tasks.names import task_names
 from tests.cli.refusals import assert_refused
-from tests.cli.tiny_tasks import TINY_TASK, rows
+from tests.cli.running import interrupted, rows
+from tests.cli.tiny_tasks import TINY_TASK, assert_resumed_as_at_once
 
 Murmillo = Callable[..., tuple[int, str, str]]
 
@@ -116,15 +117,7 @@ def test_a_run_leaves_all_that_it_should(located: Path) -> None:
 
 
 def test_resumed_run_equals_an_uninterrupted_one(murmillo: Murmillo, own: Path) -> None:
-    status, _, err = murmillo("train", "run.resume=runs/high", "runner.samples=48")
-    assert status == 0, err
-    whole = ("low=runs/low", "run.name=whole", *TINY_TASK, "runner.samples=48")
-    status, _, err = murmillo("train", "task=location", *whole)
-    assert status == 0, err
-    resumed, at_once = rows(own / "high")[-1], rows(own / "whole")[-1]
-    assert resumed.pop("samples_per_second")
-    assert at_once.pop("samples_per_second")
-    assert resumed == at_once
+    assert_resumed_as_at_once(murmillo, own, "task=location")
     assert_refused(murmillo("train", "run.resume=runs/high", "seed=2"), "seed=2", "low")
 
 
@@ -188,16 +181,9 @@ def test_a_film_has_a_picture_of_every_control_step(own: Path, folder: Path) -> 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no such signals")
 def test_a_signal_ends_the_run_with_a_checkpoint_and_a_report(murmillo: Murmillo, folder: Path) -> None:
     """Ctrl-C, and then the run is taken up again."""
-    words = ("task=location", "low=none", *TINY_TASK, "runner.samples=1000000000", "run.name=long")
-    command = [sys.executable, "-m", "murmillo.cli.main", "train", *words]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=folder) as process:
-        assert process.stdout is not None
-        for line in process.stdout:
-            if " samples, " in line:
-                process.send_signal(signal.SIGINT)
-                break
-        out, err = process.communicate(timeout=60)
-    assert process.returncode == 0, err
+    words = ("task=location", "low=none", *TINY_TASK, "run.name=long")
+    status, out, err = interrupted(signal.SIGINT, folder, *words)
+    assert status == 0, err
     assert "go on with: murmillo train run.resume=runs/long" in out
     run = folder / "runs" / "long"
     assert "plots/learning_curve.png" in (run / "report.md").read_text()
@@ -225,6 +211,7 @@ def test_a_signal_ends_the_run_with_a_checkpoint_and_a_report(murmillo: Murmillo
         (("task=location", "low=none", "task.form=letter"), ("task.form", "letter", "paper")),
         (("task=location", "low=none", "budget=larg"), ("budget=larg", "laptop")),
         (("task=location", "low=none", "latent_env.steps=2"), ("latent_env", "low=none")),
+        (("task=location", "low=none", "runner.reward_weights.task=nan"), ("reward_weights.task=nan", "finite")),
         (("task=location", "low=none", "agent.gumbel=1"), ("agent.gumbel=1", "agent=case")),
         (("task=location", "low=none", "runner.horizon=1", "num_envs=2"), ("agent.ppo.minibatch=1024", "at most 2")),
         (("task=location,strike", "low=none"), ("task=location,strike",)),

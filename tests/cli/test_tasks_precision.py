@@ -25,7 +25,8 @@ from murmillo.envs import EnvConfig, HumanoidVectorEnv
 from murmillo.envs.character import load_character
 from murmillo.envs.motion import MotionLibrary, load_clips
 from tests.cli.refusals import assert_refused
-from tests.cli.tiny_tasks import TINY_TASK, rows
+from tests.cli.running import rows
+from tests.cli.tiny_tasks import TINY_TASK, assert_resumed_as_at_once
 
 Murmillo = Callable[..., tuple[int, str, str]]
 
@@ -148,15 +149,7 @@ def test_evaluation_tells_the_styles_apart(murmillo: Murmillo, own: Path) -> Non
 
 
 def test_resumed_run_equals_an_uninterrupted_one(murmillo: Murmillo, own: Path) -> None:
-    status, _, err = murmillo("train", "run.resume=runs/high", "runner.samples=48")
-    assert status == 0, err
-    whole = ("low=runs/low", "run.name=whole", *TINY_TASK, STYLES, "runner.samples=48")
-    status, _, err = murmillo("train", "task=direction", *whole)
-    assert status == 0, err
-    resumed, at_once = rows(own / "high")[-1], rows(own / "whole")[-1]
-    assert resumed.pop("samples_per_second")
-    assert at_once.pop("samples_per_second")
-    assert resumed == at_once
+    assert_resumed_as_at_once(murmillo, own, "task=direction", STYLES)
 
 
 def test_a_film_of_a_style(own: Path, folder: Path) -> None:

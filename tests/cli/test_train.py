@@ -1,6 +1,5 @@
 """A run of two iterations from the command to its report, taken up again, measured and filmed."""
 
-import csv
 import json
 import os
 import signal
@@ -12,13 +11,9 @@ from pathlib import Path
 import pytest
 
 from murmillo.cli import gl
+from tests.cli.running import interrupted, rows
 
 Murmillo = Callable[..., tuple[int, str, str]]
-
-
-def rows(folder: Path) -> list[dict[str, str]]:
-    with (folder / "scalars.csv").open(newline="") as file:
-        return list(csv.DictReader(file))
 
 
 def test_a_run_leaves_all_that_it_should(trained: Path) -> None:
@@ -91,15 +86,8 @@ def test_ablations_train(murmillo: Murmillo, folder: Path, tiny: tuple[str, ...]
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no such signals")
 def test_a_signal_ends_the_run_with_a_checkpoint(folder: Path, tiny: tuple[str, ...]) -> None:
-    command = [sys.executable, "-m", "murmillo.cli.main", "train", *tiny, "runner.samples=1000000000", "run.name=long"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=folder) as process:
-        assert process.stdout is not None
-        for line in process.stdout:
-            if " samples, " in line:
-                process.send_signal(signal.SIGTERM)
-                break
-        out, err = process.communicate(timeout=60)
-    assert process.returncode == 0, err
+    status, out, err = interrupted(signal.SIGTERM, folder, *tiny, "run.name=long")
+    assert status == 0, err
     assert "murmillo train run.resume=runs/long" in out
     assert (folder / "runs" / "long" / "checkpoints" / "last" / "meta.json").is_file()
 

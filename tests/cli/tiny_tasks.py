@@ -1,7 +1,9 @@
-"""Runs of tasks that take a second or two, and what they log."""
+"""Runs of tasks that take a second or two, and what being taken up again must not change in them."""
 
-import csv
+from collections.abc import Callable
 from pathlib import Path
+
+from tests.cli.running import rows
 
 TINY_TASK = (
     "num_envs=4",
@@ -18,7 +20,12 @@ TINY_TASK = (
 """Two iterations."""
 
 
-def rows(folder: Path) -> list[dict[str, str]]:
-    """What a run has logged, an iteration a row."""
-    with (folder / "scalars.csv").open(newline="") as file:
-        return list(csv.DictReader(file))
+def assert_resumed_as_at_once(murmillo: Callable[..., tuple[int, str, str]], root: Path, *words: str) -> None:
+    """Take the run `high` in `root` up again, and train another by these words without a stop: both end alike."""
+    for ask in (("run.resume=runs/high",), (*words, *TINY_TASK, "low=runs/low", "run.name=whole")):
+        status, _, err = murmillo("train", *ask, "runner.samples=48")
+        assert status == 0, err
+    resumed, at_once = (rows(root / name)[-1] for name in ("high", "whole"))
+    assert resumed.pop("samples_per_second")
+    assert at_once.pop("samples_per_second")
+    assert resumed == at_once

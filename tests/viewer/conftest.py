@@ -1,7 +1,7 @@
 """Sessions with agents that have learned nothing, which is enough to see what they are told."""
 
 import dataclasses
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -39,19 +39,26 @@ def world(task: str) -> HumanoidVectorEnv:
 
 @pytest.fixture
 def play() -> Iterator[Callable[..., Session]]:
-    """`play("case")` is a session with an agent; with a task also one with a policy over the agent's latents."""
+    """`play("case")` is a session with an agent; with a task also one with a policy over the agent's latents.
+
+    `play("scratch", "Location")` has a policy that acts itself; with `styles` it is told one of these skills.
+    """
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
 
-    def make(name: str = "ase", task: str = "Imitation", seed: int = 1) -> Session:
+    def make(name: str = "ase", task: str = "Imitation", seed: int = 1, styles: Sequence[str] = ()) -> Session:
         env = world(task)
-        env.set_skill_weights(None)
+        config = TaskAgentConfig(skill=bool(styles), ppo=PPOConfig(hidden=(8,), std=0.1))
+        chance = torch.tensor([float(skill in styles) for skill in env.skills]) if styles else None
+        if name == "scratch":
+            policy = TaskAgent(env, config, torch.Generator().manual_seed(seed))
+            return Session(env, PolicyPilot(policy, None), CONFIG.fall, seed, chance)
         agent, generator = make_agent(name, small(name), env, seed)
         if task == "Imitation":
             return Session(env, AgentPilot(agent), CONFIG.fall, seed)
         decisions = LatentEnv(env, agent, decoder=SphereDecoder(agent.latent_dim))
-        policy = TaskAgent(decisions, TaskAgentConfig(ppo=PPOConfig(hidden=(8,), std=0.1)), generator)
-        return Session(env, PolicyPilot(policy, decisions), CONFIG.fall, seed)
+        policy = TaskAgent(decisions, config, generator)
+        return Session(env, PolicyPilot(policy, decisions), CONFIG.fall, seed, chance)
 
     yield make
     torch.set_num_threads(threads)

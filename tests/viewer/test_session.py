@@ -56,6 +56,28 @@ def test_a_task_that_commands_skills_by_a_clock_commands_the_chosen_one(play: Pl
     assert label(session) == session.env.skills.index("kick")
 
 
+def test_who_has_learned_some_skills_is_told_no_others(play: Play) -> None:
+    styles = ("run_forward", "walk_forward")
+    session = play("calm", "Direction", styles=styles)
+    assert session.skills == styles
+    session.command_skill("run_forward")
+    assert session.look().status.skill == "run_forward"
+    session.command_skill(None)
+    drawn = []
+    for _ in range(12):
+        session.reset()
+        drawn.append(session.look().status.skill)
+    assert set(drawn) == set(styles)
+
+
+def test_a_session_begins_by_its_own_chances(play: Play) -> None:
+    """Whatever has been drawn by in this world before."""
+    play("case", "Direction").command_skill("kick")
+    assert play("calm", "Direction", styles=("roar",)).look().status.skill == "roar"
+    told = play("case", "Direction", seed=2)
+    assert told.env.skills[label(told)] != "kick"
+
+
 def test_who_heeds_no_label_has_none_to_offer(play: Play) -> None:
     session = play("ase")
     assert session.skills == ()
@@ -303,6 +325,22 @@ def test_a_policy_decides_every_few_steps_and_its_motion_is_judged(play: Play) -
     assert set(status.rewards) == {"position", "style", "skill"}
     assert status.score is not None
     assert status.score == pytest.approx(1.0 - math.exp(-status.rewards["style"]))
+
+
+def test_a_policy_that_acts_itself_decides_every_step_and_is_judged_by_the_task_alone(play: Play) -> None:
+    session = play("scratch", "Location")
+    assert session.latents is None
+    assert session.skills == ()
+    policy, seen = session._pilot._policy, []  # type: ignore[attr-defined] # a PolicyPilot's
+    act = policy.act
+    policy.act = lambda obs, **how: (seen.append(obs["goal"].tolist()), act(obs, **how))[1]
+    session.goals.go_to(3.0, 4.0)
+    steps(session, 3)
+    assert len(seen) == 3
+    assert math.hypot(*seen[0][0]) == pytest.approx(5.0, abs=0.2)  # from where it stands, near the origin
+    status = session.look().status
+    assert set(status.rewards) == {"position"}
+    assert status.score is None
 
 
 def test_a_frame_has_the_bodies_and_then_the_props_and_is_not_changed_by_later_steps(play: Play) -> None:

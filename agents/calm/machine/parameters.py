@@ -48,7 +48,7 @@ def overridden(parameters: Mapping[str, Value], name: str, text: str) -> dict[st
     old = parameters[first]
     if isinstance(old, dict) != bool(rest):
         entries = ", ".join(f"{first}.{entry}" for entry in old) if isinstance(old, dict) else f"{first} alone"
-        raise AgentError(f"{name} sets a part of what is none; write {entries}")
+        raise AgentError(f"{name}: {first} is {'a table' if isinstance(old, dict) else 'no table'}; write {entries}")
     return {**parameters, first: overridden(old, rest, text) if isinstance(old, dict) else _like(old, text)}
 
 
@@ -59,7 +59,7 @@ def _like(old: str | float, text: str) -> str | float:
         number = float(text)
     except ValueError:
         number = math.nan
-    if math.isnan(number):
+    if not math.isfinite(number):
         raise AgentError(f"{text} is no number, which is needed here")
     return number
 
