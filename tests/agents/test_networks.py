@@ -58,8 +58,3 @@ def test_the_style_network_answers_within_its_tanh(generator: torch.Generator) -
     style = policy(style_hidden=(8,)).style(100 * torch.randn(20, 4, generator=generator))
     assert style.shape == (20, 4)
     assert style.abs().max() <= 1
-
-
-def test_no_standard_deviation_is_refused(generator: torch.Generator) -> None:
-    with pytest.raises(AgentError, match=r"ppo\.std"):
-        GaussianPolicy(5, 3, (8,), 0.0, generator)
