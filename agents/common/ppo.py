@@ -188,10 +188,10 @@ class PPO:
             AgentError: the minibatch is larger than the rollout.
         """
         config = self.config
-        if config.minibatch > rollout.samples:
+        if config.minibatch > rollout.part.total:
             raise AgentError(
-                f"ppo.minibatch={config.minibatch} is larger than the {rollout.samples} samples of an iteration "
-                f"({rollout.horizon} steps of {rollout.num_envs} worlds)"
+                f"ppo.minibatch={config.minibatch} is larger than the {rollout.part.total} samples of an iteration "
+                f"({rollout.horizon} steps of {rollout.num_envs * rollout.ranks.size} worlds)"
             )
         data = {name: rollout.flat(name) for name in ("action", "log_prob", "advantage", *fields)}
         data["state"] = self.model.state_normalizer(rollout.flat("state"))

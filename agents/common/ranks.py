@@ -6,6 +6,8 @@ up to the order of summation. On its own (`ALONE`) nothing here computes anythin
 """
 
 import os
+import time
+import uuid
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -16,6 +18,8 @@ from typing import Any, TypeVar
 import torch
 import torch.distributed as dist
 from torch import Tensor, nn
+from torch.distributed.distributed_c10d import PrefixStore, Store
+from torch.distributed.rendezvous import rendezvous
 
 from murmillo.agents.common.errors import AgentError
 
@@ -244,11 +248,43 @@ def joined() -> Iterator[Ranks]:
     gpu = torch.cuda.is_available()
     if gpu:
         torch.cuda.set_device(int(os.environ.get("LOCAL_RANK", 0)))
-    _talk(lambda: dist.init_process_group("cpu:gloo,cuda:nccl" if gpu else "gloo", timeout=PATIENCE))
+    _talk(lambda: _meet(rank, size, "cpu:gloo,cuda:nccl" if gpu else "gloo"))
     try:
         yield Ranks(rank, size)
     finally:
         dist.destroy_process_group()
+
+
+def _meet(rank: int, size: int, backend: str) -> None:
+    """Find the other ranks through torchrun's store."""
+    store, _, _ = next(iter(rendezvous("env://", rank, size, timeout=PATIENCE)))
+    store = PrefixStore(_password(store, rank, size), store)
+    dist.init_process_group(backend, store=store, rank=rank, world_size=size, timeout=PATIENCE)
+
+
+def _password(store: Store, rank: int, size: int) -> str:
+    """A word that only these processes know.
+
+    torchrun's store outlives its processes: without a name of their own, those that are started again may find there
+    where the former ones could be reached, and wait for them. So every rank calls with a word of its own, and the first
+    answers it.
+    """
+    word = uuid.uuid4().hex
+    if rank:
+        store.set(f"call/{rank}", word)
+        password = store.get(f"answer/{word}").decode()
+        store.set(f"{password}/{rank}", "heard")
+        return password
+    absent, begun = set(range(1, size)), time.monotonic()
+    while absent:
+        if time.monotonic() - begun > PATIENCE.total_seconds():
+            raise RuntimeError(f"rank {min(absent)} has not come")
+        for other in absent:
+            if store.check([f"call/{other}"]):
+                store.set(f"answer/{store.get(f'call/{other}').decode()}", word)
+        time.sleep(0.01)
+        absent = {other for other in absent if not store.check([f"{word}/{other}"])}
+    return word
 
 
 def _talk(say: Callable[[], Any]) -> None:

@@ -6,13 +6,12 @@ from typing import Any
 
 import pytest
 import torch
-import torch.multiprocessing as mp
 from torch import Tensor
+from torch.multiprocessing.spawn import spawn
 
 from murmillo.agents.common import checkpoint
-from murmillo.agents.common.ranks import Part, Ranks
 from tests.agents.toy import equal, small_ase
-from tests.agents.toy_ranks import WORLDS, make_run, run_as, train_alone
+from tests.agents.toy_ranks import run_as, train_alone
 
 RUNS: dict[str, tuple[str, dict[str, Any]]] = {
     "ase": ("ase", {}),
@@ -30,7 +29,7 @@ def shared(tmp_path_factory: pytest.TempPathFactory) -> Path:
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
-    mp.spawn(run_as, (2, port, folder, RUNS), nprocs=2)
+    spawn(run_as, (2, port, folder, RUNS), nprocs=2)
     return folder
 
 
