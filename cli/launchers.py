@@ -10,7 +10,7 @@ CHOICE = "hydra/launcher="
 
 
 class Launcher(NamedTuple):
-    """A launcher by its name in `conf/hydra/launcher`.
+    """A launcher of hydra's by its name; `conf/launcher` has the settings that differ from the plugin's.
 
     Attributes:
         plugin: the module of hydra's that it needs.
@@ -53,14 +53,21 @@ def shared_out(words: list[str], launcher: str | None, runs: int) -> list[str]:
 
     A run's `threads` are its share of the cores: of the runs at a time (joblib), of all (submitit_local), of what ray
     gives it. Slurm gives each job cores of its own.
+
+    Raises:
+        CommandError: joblib's number of runs at a time is none.
     """
     settings = dict(word.split("=", 1) for word in words if "=" in word)
     cores, added = versions.usable_cores(), {}
     if launcher == "joblib":
-        at_a_time = settings.get("hydra.launcher.n_jobs") or str(min(runs, cores))
-        added = {"hydra.launcher.n_jobs": at_a_time, "threads": str(max(1, cores // max(1, int(at_a_time))))}
+        at_a_time = min(runs, cores)
+        given = settings.get("hydra.launcher.n_jobs", str(at_a_time))
+        if not given.isdecimal() or given == "0":
+            raise CommandError(f"hydra.launcher.n_jobs={given}: needs a number of runs at a time, at least 1")
+        added = {"hydra.launcher.n_jobs": given, "threads": str(max(1, cores // int(given)))}
     elif launcher == "submitit_local":
         added = {"threads": str(max(1, cores // runs))}
     elif launcher == "ray":
         added = {"threads": settings.get("hydra.launcher.ray.remote.num_cpus", "2")}
-    return [*words, *(f"{name}={value}" for name, value in added.items() if name not in settings)]
+    ours = [] if launcher is None else [f"+launcher={launcher}"]
+    return [*words, *ours, *(f"{name}={value}" for name, value in added.items() if name not in settings)]

@@ -104,9 +104,9 @@ class AdaptNet:
         windows = rollout.flat("next_window")
         for _ in range(config.epochs):
             for rows, part in rollout.minibatches(config.minibatch, generator):
-                drawn = self.demonstrations(part.total, generator)
+                drawn = part.drawn(self.demonstrations, generator)
                 agent = Windows(windows[rows], mask=self.masks.draw(len(rows), generator, part=part), part=part)
-                demonstration = Windows(part.of(drawn["window"]), mask=part.of(drawn.get("mask")), part=part)
+                demonstration = Windows(drawn["window"], mask=drawn.get("mask"), part=part)
                 loss = hinge_loss(self.discriminator, agent, demonstration, config.gradient_penalty, generator)
                 minimise(self.optimizer, loss.parts, ranks=rollout.ranks)
                 means.add({**loss.parts, **loss.scores})

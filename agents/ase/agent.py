@@ -110,12 +110,12 @@ class ASE:
             rows, part = rollout.draw(k, generator)
             agent = windows[rows]
             replay, old = self.replay.sample(k, generator) if len(self.replay) else ({"window": agent}, part)
-            drawn = self.demonstrations(k, generator)
+            drawn = part.drawn(self.demonstrations, generator)
             loss = discriminator_loss(
                 self.discriminator,
                 agent=Windows(agent, mask=self.masks.draw(k, generator, part=part), part=part),
                 replay=Windows(replay["window"], mask=self.masks.draw(k, generator, part=old), part=old),
-                demonstration=Windows(part.of(drawn["window"]), mask=part.of(drawn.get("mask")), part=part),
+                demonstration=Windows(drawn["window"], mask=drawn.get("mask"), part=part),
             )
             losses = dict(loss.parts)
             if config.skill_discovery:

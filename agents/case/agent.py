@@ -140,9 +140,7 @@ class CASE:
             if len(self.replay):
                 remembered, old = self.replay.sample(k, generator)
                 replay = self._agent_windows(remembered["window"], remembered["label"], old)
-            drawn = self._draw_demonstrations()
-            demonstration = Windows(part.of(drawn.window), part.of(drawn.condition), part.of(drawn.mask), part)
-            loss = discriminator_loss(self.discriminator, agent, replay, demonstration)
+            loss = discriminator_loss(self.discriminator, agent, replay, self._draw_demonstrations(part))
             losses = dict(loss.parts)
             if config.skill_discovery:
                 mu_q = self.encoder(loss.agent_inputs, labels[rows])
@@ -225,10 +223,12 @@ class CASE:
         """What the demonstrations of the same skills leave out is left out too (adaptive masking, appendix A.5)."""
         return self.masks.draw(len(label), self.generator, label, part=part)
 
-    def _draw_demonstrations(self) -> Windows:
-        k = self.config.discriminator.minibatch
-        drawn = self.demonstrations(k, self.generator, self.focal.draw(k, self.generator))
-        return Windows(drawn["window"], drawn["skill"], drawn.get("mask"))
+    def _draw_demonstrations(self, part: Part | None = None) -> Windows:
+        """A minibatch of them, or a part of it."""
+        part = part or Part(ALONE, self.config.discriminator.minibatch)
+        skill = self.focal.draw(part.total, self.generator)
+        drawn = part.drawn(self.demonstrations, self.generator, skill=skill)
+        return Windows(drawn["window"], drawn["skill"], drawn.get("mask"), part)
 
     def _observe(self, demonstrations: Windows) -> None:
         self.discriminator.observe(demonstrations.window, demonstrations.mask)

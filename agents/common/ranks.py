@@ -178,6 +178,13 @@ class Part:
         """This rank's rows of a tensor `[total, ...]` that every rank has; None of None."""
         return x if x is None or self.place is None else x[self.place]  # type: ignore[index]
 
+    def drawn(
+        self, draw: Callable[..., dict[str, Tensor]], generator: torch.Generator, **asked: Any
+    ) -> dict[str, Tensor]:
+        """This rank's rows of what `draw(total, generator, **asked)` gives (`interface.Demonstrations`)."""
+        of = {} if self.place is None else {"rows": self.place}
+        return draw(self.total, generator, **asked, **of)
+
     def weigh(self, means: Mapping[str, Tensor]) -> dict[str, Tensor]:
         """Means over this rank's rows, by name, times the weight."""
         return dict(means) if self.place is None else {name: self.weight * mean for name, mean in means.items()}

@@ -15,7 +15,7 @@ import pytest
 from murmillo.cli import runs
 
 TORCHRUN = (sys.executable, "-m", "torch.distributed.run", "--standalone", "--nproc-per-node=2", "--max-restarts=1")
-SAMPLES = 64 * 60
+SAMPLES = 64 * 30
 
 
 @pytest.mark.slow
