@@ -20,6 +20,7 @@ from murmillo.agents.common.dimensions import skill_count
 from murmillo.agents.common.errors import AgentError
 from murmillo.agents.common.networks import GaussianPolicy, linear
 from murmillo.agents.common.ppo import PPOConfig
+from murmillo.agents.common.ranks import ALONE, Ranks
 from murmillo.agents.common.task_agent import TaskAgent, TaskAgentConfig
 
 
@@ -142,7 +143,9 @@ class HybridPolicy(GaussianPolicy):
         return F.log_softmax(perturbed / self.gumbel, -1)
 
 
-def hybrid_agent(env: VectorEnv, config: HybridConfig, generator: torch.Generator) -> TaskAgent:
+def hybrid_agent(
+    env: VectorEnv, config: HybridConfig, generator: torch.Generator, *, ranks: Ranks = ALONE
+) -> TaskAgent:
     """A `TaskAgent` that chooses labels and latents, in a `LatentEnv` with a `HybridDecoder`.
 
     Raises:
@@ -156,4 +159,4 @@ def hybrid_agent(env: VectorEnv, config: HybridConfig, generator: torch.Generato
             width, labels, latent_dim, config.ppo, generator, condition_dim=condition_dim, gumbel=config.gumbel
         )
 
-    return TaskAgent(env, config, generator, make_policy)
+    return TaskAgent(env, config, generator, make_policy, ranks=ranks)

@@ -15,6 +15,7 @@ from murmillo.agents.common.errors import AgentError
 from murmillo.agents.common.interface import Obs, Step
 from murmillo.agents.common.networks import GaussianPolicy
 from murmillo.agents.common.ppo import PPO, ActorCritic, Minibatch, PPOConfig
+from murmillo.agents.common.ranks import ALONE, Ranks
 from murmillo.agents.common.rollout import Rollout
 from murmillo.agents.common.training import load_parts, named, state_of
 
@@ -54,6 +55,8 @@ class TaskAgent:
         config: TaskAgentConfig,
         generator: torch.Generator,
         make_policy: MakePolicy | None = None,
+        *,
+        ranks: Ranks = ALONE,
     ) -> None:
         """
         Args:
@@ -61,12 +64,14 @@ class TaskAgent:
             config: hyperparameters.
             generator: draws weights, noise and minibatches.
             make_policy: for actions that are not Gaussian.
+            ranks: who train it together.
 
         Raises:
             AgentError: the environment has no "state", no "skill" where it is asked for, or actions that are no vector.
         """
         self.config = config
         self.generator = generator
+        self.ranks = ranks
         observed, action_dim = _observed(env), action_size(env)
         self._inputs = [name for name in ("state", "goal") if name in observed]
         self._told = ("skill",) if config.skill else ()
@@ -79,8 +84,8 @@ class TaskAgent:
         self._parts = {"ppo": self.ppo}
 
     def act(self, obs: Obs, *, deterministic: bool = False) -> Step:
-        action, log_prob = self.model.act(self._input(obs), self._condition(obs), self.generator, deterministic)
-        return Step(action, log_prob)
+        told = self._condition(obs)
+        return Step(*self.model.act(self._input(obs), told, self.generator, deterministic, ranks=self.ranks))
 
     def value(self, obs: Obs, extras: dict[str, Tensor]) -> Tensor:
         return self.model.value(self._input(obs), self._condition(obs))
@@ -94,7 +99,7 @@ class TaskAgent:
 
     def update(self, rollout: Rollout) -> dict[str, float]:
         """One iteration of PPO."""
-        seen = Rollout(*rollout.shape)
+        seen = Rollout(*rollout.shape, rollout.ranks)
         for name in ("action", "log_prob", "advantage", "return", *self._told):
             seen[name] = rollout[name]
         seen["state"] = self._input({name: rollout[name] for name in self._inputs})
