@@ -15,6 +15,7 @@ from murmillo.agents.adaptnet.spaces import Observed
 from murmillo.agents.common.adapter import INJECTION, AdaptedPolicy
 from murmillo.agents.common.discriminator import Windows
 from murmillo.agents.common.errors import AgentError
+from murmillo.agents.common.exploration import ActionNoise
 from murmillo.agents.common.interface import Demonstrations, Obs, Step
 from murmillo.agents.common.masks import FeatureMasks
 from murmillo.agents.common.ppo import PPO, Minibatch
@@ -69,12 +70,18 @@ class AdaptNet:
         self._observe_demonstrations()
         self.masks = FeatureMasks(demonstrations)
         self.optimizer = adam((self.discriminator.parameters(), config.discriminator.learning_rate))
-        self._parts = {"ppo": self.ppo, "discriminator": self.discriminator, "optimizer": self.optimizer}
+        self.noise = ActionNoise(generator, config.ppo.noise_correlation, ranks)
+        self._parts = {
+            "ppo": self.ppo,
+            "noise": self.noise,
+            "discriminator": self.discriminator,
+            "optimizer": self.optimizer,
+        }
         self._playing = False
 
     def act(self, obs: Obs, *, deterministic: bool = False) -> Step:
         told = self.observed.beside(obs)
-        return Step(*self.model.act(self.observed.state(obs), told, self.generator, deterministic, ranks=self.ranks))
+        return Step(*self.model.act(self.observed.state(obs), told, None if deterministic else self.noise))
 
     def value(self, obs: Obs, extras: dict[str, Tensor]) -> Tensor:
         """Expected returns `[..., 2]` of goal and imitation."""

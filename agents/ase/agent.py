@@ -10,6 +10,7 @@ from murmillo.agents.ase.config import ASEConfig
 from murmillo.agents.ase.encoder import Encoder
 from murmillo.agents.common.dimensions import dimensions
 from murmillo.agents.common.discriminator import Discriminator, Windows, discriminator_loss, style_reward
+from murmillo.agents.common.exploration import ActionNoise
 from murmillo.agents.common.interface import Demonstrations, Obs, Step
 from murmillo.agents.common.latents import LatentSequence, sample_sphere
 from murmillo.agents.common.masks import FeatureMasks
@@ -55,6 +56,7 @@ class ASE:
         self.latents = LatentSequence(env.num_envs, config.latent_dim, generator, *config.latent_steps, ranks=ranks)
         self.model = ActorCritic(state_dim, action_dim, config.latent_dim, config.ppo, generator)
         self.ppo = PPO(self.model, config.ppo)
+        self.noise = ActionNoise(generator, config.ppo.noise_correlation, ranks)
         hidden = config.discriminator.hidden
         self.discriminator = Discriminator(config.window, state_dim, config.discriminator, generator, ranks=ranks)
         # known before the first update, lest that judges windows in raw units and every later one in other units
@@ -67,6 +69,7 @@ class ASE:
         self.replay = Replay(config.discriminator.replay_size, config.discriminator.replay_keep, ranks)
         self._parts = {
             "ppo": self.ppo,
+            "noise": self.noise,
             "discriminator": self.discriminator,
             "encoder": self.encoder,
             "optimizer": self.optimizer,
@@ -77,7 +80,7 @@ class ASE:
     def act(self, obs: Obs, *, deterministic: bool = False) -> Step:
         """Lines 9-11: one step under the sequence of latents; the mean action if deterministic."""
         latent = self.latents.step()
-        action, log_prob = self.model.act(obs["state"], latent, self.generator, deterministic, ranks=self.ranks)
+        action, log_prob = self.model.act(obs["state"], latent, None if deterministic else self.noise)
         return Step(action, log_prob, {"latent": latent})
 
     def value(self, obs: Obs, extras: dict[str, Tensor]) -> Tensor:

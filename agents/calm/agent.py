@@ -13,6 +13,7 @@ from murmillo.agents.calm.losses import alignment_loss, uniformity_loss
 from murmillo.agents.calm.motions import MotionSequence, cut, select
 from murmillo.agents.common.dimensions import dimensions
 from murmillo.agents.common.discriminator import Discriminator, Windows, discriminator_loss, style_reward
+from murmillo.agents.common.exploration import ActionNoise
 from murmillo.agents.common.interface import Demonstrations, Obs, Step
 from murmillo.agents.common.latents import sample_sphere
 from murmillo.agents.common.ppo import PPO, ActorCritic, Minibatch
@@ -56,6 +57,7 @@ class CALM:
         self.model = ActorCritic(state_dim, action_dim, config.latent_dim, config.ppo, generator)
         self.encoder = MotionEncoder(state_dim, config.latent_dim, config.encoder, generator)
         self.ppo = PPO(self.model, config.ppo, self.encoder.parameters())
+        self.noise = ActionNoise(generator, config.ppo.noise_correlation, ranks)
         condition = LatentCondition(config.latent_dim, config.discriminator_style_hidden, generator)
         self.discriminator = Discriminator(
             config.window, state_dim, config.discriminator, generator, condition, ranks=ranks
@@ -68,6 +70,7 @@ class CALM:
         )
         self._parts = {
             "ppo": self.ppo,
+            "noise": self.noise,
             "encoder": self.encoder,
             "discriminator": self.discriminator,
             "optimizer": self.optimizer,
@@ -100,7 +103,7 @@ class CALM:
         if deterministic:
             self.motions.forget()  # nothing is learnt from a mean action: a player keeps no more than it follows
         latent, motion = self.motions.step()
-        action, log_prob = self.model.act(obs["state"], latent, self.generator, deterministic, ranks=self.ranks)
+        action, log_prob = self.model.act(obs["state"], latent, None if deterministic else self.noise)
         mask = self.motions.mask(motion)
         extras = {"latent": latent, "motion": motion}
         return Step(action, log_prob, extras if mask is None else extras | {"mask": mask})

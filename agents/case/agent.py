@@ -11,6 +11,7 @@ from murmillo.agents.case.focal import FocalSampling
 from murmillo.agents.case.networks import Encoder, LabelEmbedding, SkillHeads
 from murmillo.agents.common.dimensions import dimensions, skill_count
 from murmillo.agents.common.discriminator import Discriminator, Windows, discriminator_loss, style_reward
+from murmillo.agents.common.exploration import ActionNoise
 from murmillo.agents.common.interface import Demonstrations, Obs, Step
 from murmillo.agents.common.latents import LatentSequence, sample_sphere
 from murmillo.agents.common.masks import FeatureMasks
@@ -63,6 +64,7 @@ class CASE:
         self.label = LabelEmbedding(labels, config.label_dim, generator)
         self.model = ActorCritic(state_dim, action_dim, config.latent_dim + config.label_dim, config.ppo, generator)
         self.ppo = PPO(self.model, config.ppo, self.label.parameters())
+        self.noise = ActionNoise(generator, config.ppo.noise_correlation, ranks)
         heads = SkillHeads(labels)
         self.discriminator = Discriminator(
             config.window, state_dim, config.discriminator, generator, heads, ranks=ranks
@@ -79,6 +81,7 @@ class CASE:
         self.iterations = 0
         self._parts = {
             "ppo": self.ppo,
+            "noise": self.noise,
             "discriminator": self.discriminator,
             "encoder": self.encoder,
             "optimizer": self.optimizer,
@@ -93,7 +96,7 @@ class CASE:
         """One step under the labels that are commanded now and the sequence of latents."""
         latent, label = self.latents.step(), obs["skill"]
         told = self.condition(latent, label)
-        action, log_prob = self.model.act(obs["state"], told, self.generator, deterministic, ranks=self.ranks)
+        action, log_prob = self.model.act(obs["state"], told, None if deterministic else self.noise)
         return Step(action, log_prob, {"latent": latent, "label": label})
 
     def condition(self, latent: Tensor, label: Tensor) -> Tensor:

@@ -9,6 +9,7 @@ import torch
 from torch import Tensor, nn
 
 from murmillo.agents.common.errors import AgentError
+from murmillo.agents.common.exploration import ActionNoise
 from murmillo.agents.common.losses import action_bound_loss, gaussian_entropy, gaussian_log_prob
 from murmillo.agents.common.ranks import ALONE, Ranks
 
@@ -108,10 +109,10 @@ class Policy(nn.Module):
         """Mean `[..., A]` and logarithm of the standard deviation, `[..., A]` or `[A]`."""
         return parameters, self.log_std
 
-    def sample(self, parameters: Tensor, generator: torch.Generator) -> Tensor:
-        """Actions `[..., A]` drawn from the distributions with these parameters."""
+    def sample(self, parameters: Tensor, noise: ActionNoise) -> Tensor:
+        """Actions `[N, A]` drawn from the distributions with these parameters `[N, P]`."""
         mean, log_std = self.moments(parameters)
-        return mean + log_std.exp() * torch.randn(mean.shape, generator=generator)
+        return mean + log_std.exp() * noise.step(*mean.shape)
 
     def mode(self, parameters: Tensor) -> Tensor:
         """The likeliest actions `[..., A]`."""

@@ -9,11 +9,12 @@ import torch
 from torch import Tensor, nn
 
 from murmillo.agents.common.errors import AgentError
+from murmillo.agents.common.exploration import ActionNoise
 from murmillo.agents.common.losses import approx_kl, clip_fraction, ppo_policy_loss, value_loss
 from murmillo.agents.common.networks import Critic, GaussianPolicy, Policy, Told
 from murmillo.agents.common.normalizer import RunningNormalizer
 from murmillo.agents.common.numbers import check_above_zero, check_at_least
-from murmillo.agents.common.ranks import ALONE, Part, Ranks
+from murmillo.agents.common.ranks import Part
 from murmillo.agents.common.rollout import Rollout
 from murmillo.agents.common.training import Means, adam, adam_state, load_adam_state, load_module, minimise
 
@@ -38,6 +39,7 @@ class PPOConfig:
         hidden: sizes of the hidden layers of policy and critic.
         style_hidden: hidden sizes of the style network before the policy's condition; empty for none.
         std: the policy's standard deviation; the paper's variance is 0.0025.
+        noise_correlation: between the noise of one action and the next; the papers' noise is white.
         mean_init_scale: factor on the initial weights of the policy's last layer.
         policy_learning_rate: Adam's step for the policy.
         value_learning_rate: Adam's step for the critic.
@@ -54,6 +56,7 @@ class PPOConfig:
     hidden: tuple[int, ...] = (1024, 1024, 512)
     style_hidden: tuple[int, ...] = (512, 256)
     std: float = 0.05
+    noise_correlation: float = 0.0
     mean_init_scale: float = 1.0
     policy_learning_rate: float = 2e-5
     value_learning_rate: float = 2e-5
@@ -70,6 +73,8 @@ class PPOConfig:
         check_at_least(0, self, "agent.ppo", "policy_learning_rate", "value_learning_rate")
         check_at_least(0, self, "agent.ppo", "mean_init_scale", "bound_weight", "value_weight")
         check_above_zero(self, "agent.ppo", "std", "clip", "max_grad_norm", "target_kl")
+        if not 0 <= self.noise_correlation < 1:
+            raise AgentError(f"agent.ppo.noise_correlation={self.noise_correlation}: needs at least 0 and less than 1")
 
 
 class ActorCritic(nn.Module):
@@ -109,22 +114,10 @@ class ActorCritic(nn.Module):
         self.return_normalizer: Any = return_normalizer or RunningNormalizer()
 
     @torch.no_grad()
-    def act(
-        self,
-        state: Tensor,
-        told: Told,
-        generator: torch.Generator,
-        deterministic: bool = False,
-        *,
-        ranks: Ranks = ALONE,
-    ) -> tuple[Tensor, Tensor]:
-        """Actions `[N, A]` and their log probabilities `[N]` for raw states `[N, D]`, of each rank as many."""
+    def act(self, state: Tensor, told: Told = None, noise: ActionNoise | None = None) -> tuple[Tensor, Tensor]:
+        """Actions `[N, A]` and their log probabilities `[N]` for raw states `[N, D]`; the likeliest without noise."""
         parameters = self.policy(self.state_normalizer(state), told)
-        if deterministic:
-            action = self.policy.mode(parameters)
-        else:
-            worlds = ranks.worlds(len(parameters))
-            action = worlds.of(self.policy.sample(worlds.spread(parameters), generator))
+        action = self.policy.mode(parameters) if noise is None else self.policy.sample(parameters, noise)
         return action, self.policy.log_prob(action, parameters)
 
     @torch.no_grad()

@@ -12,6 +12,7 @@ from torch.nn import functional as F
 
 from murmillo.agents.common.dimensions import action_size, skill_count
 from murmillo.agents.common.errors import AgentError
+from murmillo.agents.common.exploration import ActionNoise
 from murmillo.agents.common.interface import Obs, Step
 from murmillo.agents.common.networks import GaussianPolicy
 from murmillo.agents.common.ppo import PPO, ActorCritic, Minibatch, PPOConfig
@@ -81,11 +82,12 @@ class TaskAgent:
         policy = make_policy(width, action_dim, self._skills) if make_policy else None
         self.model = ActorCritic(width, action_dim, self._skills, config.ppo, generator, policy)
         self.ppo = PPO(self.model, config.ppo)
-        self._parts = {"ppo": self.ppo}
+        self.noise = ActionNoise(generator, config.ppo.noise_correlation, ranks)
+        self._parts = {"ppo": self.ppo, "noise": self.noise}
 
     def act(self, obs: Obs, *, deterministic: bool = False) -> Step:
         told = self._condition(obs)
-        return Step(*self.model.act(self._input(obs), told, self.generator, deterministic, ranks=self.ranks))
+        return Step(*self.model.act(self._input(obs), told, None if deterministic else self.noise))
 
     def value(self, obs: Obs, extras: dict[str, Tensor]) -> Tensor:
         return self.model.value(self._input(obs), self._condition(obs))

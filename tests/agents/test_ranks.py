@@ -1,6 +1,7 @@
 """Several processes learn what one does. Two of them, started once, run everything that is compared here."""
 
 import socket
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from tests.agents.toy import equal, small_ase
 from tests.agents.toy_ranks import run_as, train_alone
 
 RUNS: dict[str, tuple[str, dict[str, Any]]] = {
-    "ase": ("ase", {}),
+    "ase": ("ase", {"ppo": replace(small_ase().ppo, noise_correlation=0.5)}),
     "case": ("case", {"discriminator": small_ase().discriminator}),  # without dropout
     "calm": ("calm", {}),
     "calm_shuffled": ("calm", {"negatives": "shuffled"}),
