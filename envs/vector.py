@@ -136,6 +136,11 @@ class HumanoidVectorEnv(VectorEnv):
         return self.library.skills
 
     @property
+    def tensors(self) -> bool:
+        """Whether steps and resets give tensors."""
+        return self.config.tensors
+
+    @property
     def state(self) -> State:
         """The live physical state of all worlds."""
         return self.physics.state

@@ -108,6 +108,7 @@ class AdaptNet:
 
         told = self.observed.told
         seen = Rollout(*rollout.shape)
+        seen.kept = rollout.kept
         for name in ("action", "log_prob", "advantage", "return", *told):
             seen[name] = rollout[name]
         seen["state"] = self.observed.state({"state": rollout["state"]})

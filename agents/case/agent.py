@@ -185,7 +185,7 @@ class CASE:
         """
         agent = self.head_scores(rollout)
         started = self.iterations >= self.config.focal_start
-        self.focal.update(agent["right"].flatten(), rollout.flat("label"), active=started)
+        self.focal.update(agent["right"].flatten(), rollout["label"].flatten(), active=started)
         scores = {"agent": agent, "demonstration": self._heads(demonstrations)}
         return {f"{who}_{head}": s.mean().item() for who, heads in scores.items() for head, s in heads.items()}
 

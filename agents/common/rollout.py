@@ -13,20 +13,25 @@ from murmillo.agents.common.errors import AgentError
 class Rollout:
     """T steps of N worlds as named tensors `[T, N, ...]` of float32, int64 or bool.
 
-    A field is allocated when it is first stored and lives on, so that an iteration writes where the last one wrote.
+    A field is allocated when it is first stored, on the device of its values, and lives on, so that an iteration writes
+    where the last one wrote.
     "state", "skill", ... are what the agent saw, "next_state", ... their true successors (`true_next_obs`).
+
+    Attributes:
+        kept: indices of the rows of `flat` among the T N; None keeps all.
     """
 
     def __init__(self, horizon: int, num_envs: int) -> None:
         self.horizon = horizon
         self.num_envs = num_envs
+        self.kept: Tensor | None = None
         self._fields: dict[str, Tensor] = {}
 
     def store(self, t: int, fields: Mapping[str, Tensor]) -> None:
         """Copy each `[N, ...]` of `fields` into row `t`."""
         for name, value in fields.items():
             if name not in self._fields:
-                self._fields[name] = torch.empty(self.horizon, *value.shape, dtype=_kind(value))
+                self._fields[name] = torch.empty(self.horizon, *value.shape, dtype=_kind(value), device=value.device)
             self._fields[name][t] = value
 
     def __getitem__(self, name: str) -> Tensor:
@@ -53,19 +58,30 @@ class Rollout:
         """T N."""
         return self.horizon * self.num_envs
 
+    def leave_out(self, rows: Tensor) -> None:
+        """Learn nothing from these steps `[T, N]` bool: `flat` and `minibatches` go without them."""
+        self.kept = (~rows).flatten().nonzero().flatten() if rows.any() else None
+
     def flat(self, name: str) -> Tensor:
-        """The field as a view `[T N, ...]`."""
-        return self[name].flatten(0, 1)
+        """The field `[T N, ...]`, a view where no row is left out."""
+        rows = self[name].flatten(0, 1)
+        return rows if self.kept is None else rows[self.kept]
 
     def minibatches(self, size: int, generator: torch.Generator) -> Iterator[Tensor]:
-        """Row indices `[<= size]` into the flat views, every row once, in random order; the last may be smaller."""
-        yield from torch.randperm(self.samples, generator=generator).split(size)
+        """Row indices `[<= size]` into the flat fields, every row once, in random order; the last may be smaller."""
+        rows = self.samples if self.kept is None else len(self.kept)
+        yield from torch.randperm(rows, generator=generator, device=generator.device).split(size)
 
 
 def _kind(value: Tensor) -> torch.dtype:
     if value.dtype == torch.bool:
         return torch.bool
     return torch.float32 if value.is_floating_point() else torch.int64
+
+
+def taken(env: Any, action: Tensor) -> Any:
+    """The action as the environment takes it: a tensor where it shows tensors (its `tensors`), else an array."""
+    return action if getattr(env, "tensors", False) else action.cpu().numpy()
 
 
 def tensors(obs: Any) -> dict[str, Tensor]:

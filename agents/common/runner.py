@@ -18,7 +18,7 @@ from murmillo.agents.common.errors import AgentError
 from murmillo.agents.common.failures import WatchConfig
 from murmillo.agents.common.interface import Agent, Directing, MultiObjective
 from murmillo.agents.common.logger import Logger
-from murmillo.agents.common.rollout import Rollout, tensors, true_next_obs
+from murmillo.agents.common.rollout import Rollout, taken, tensors, true_next_obs
 from murmillo.agents.common.watch import Watch
 
 _SAVED = ("meta", "agent", "generator", "samples", "iteration", "watch")
@@ -60,6 +60,10 @@ class Runner:
 
     That holds where the environment has `state_dict` and `load_state_dict` and draws its randomness from a state in it;
     without them a resumed run begins with fresh episodes.
+
+    Nothing is learned from steps in which a world's simulation diverged (`infos["healed"]`).
+
+    Tensors are where the generator is; on a GPU, make the agent and call the runner in `with torch.device(...)`.
     """
 
     def __init__(
@@ -154,13 +158,15 @@ class Runner:
             step = self.agent.act(obs)
             seen = {name: value for name, value in obs.items() if name in self.agent.needs}
             rollout.store(t, {**seen, **step.extras, "action": step.action, "log_prob": step.log_prob})
-            next_obs, reward, terminated, truncated, infos = self.env.step(step.action.numpy())
+            next_obs, reward, terminated, truncated, infos = self.env.step(taken(self.env, step.action))
 
             successor = {f"next_{name}": value for name, value in true_next_obs(next_obs, infos).items()}
             successor = {name: value for name, value in successor.items() if name in self.agent.needs}
             ends = {"terminated": torch.as_tensor(terminated), "truncated": torch.as_tensor(truncated)}
             side = {name: torch.as_tensor(term) for name, term in infos.get("side_rewards", {}).items()}
             rollout.store(t, {**successor, **ends, "task": torch.as_tensor(reward), **side})
+            if "healed" in infos:
+                rollout.store(t, {"healed": torch.as_tensor(infos["healed"])})
             done = ends["terminated"] | ends["truncated"]
             self._episodes.step(ends["terminated"], done)
             if done.any():
@@ -213,6 +219,8 @@ class Runner:
         next_obs = {name[5:]: rollout[name] for name in self.agent.needs if name.startswith("next_")}
         value, next_value = self.agent.value(obs, extras), self.agent.value(next_obs, extras)
         done = rollout["terminated"] | rollout["truncated"]
+        if "healed" in rollout:
+            self._leave_out(rollout, rollout["healed"], value)
         advantage = gae(
             rollout["reward"], value, next_value, rollout["terminated"], done, self.config.gamma, self.config.lam
         )
@@ -222,6 +230,12 @@ class Runner:
             rollout["advantage"] = weigh_advantages(advantage, weights)
         else:
             rollout["advantage"] = normalise_advantage(advantage)
+
+    def _leave_out(self, rollout: Rollout, healed: Tensor, value: Tensor) -> None:
+        """Learn nothing from steps in which a simulation diverged; the steps before them end in the expected return."""
+        rollout.leave_out(healed)
+        wide = healed.view(*rollout.shape, *[1] * (value.dim() - 2))
+        rollout["reward"] = torch.where(wide, value, rollout["reward"])
 
     def _check(self, scalars: Mapping[str, float]) -> None:
         for name, value in scalars.items():
@@ -240,6 +254,7 @@ class Runner:
             "iteration": float(self.iteration),
             "samples_per_second": self._rollout.samples / seconds,
             **self._episodes.summary(),
+            **({"episode/healed": float(self._rollout["healed"].sum())} if "healed" in self._rollout else {}),
             **scalars,
         }
         if self.logger is not None:
@@ -275,13 +290,20 @@ class Runner:
         if missing:
             raise AgentError(f"{folder} has no {', '.join(missing)}: it is no run of this version; begin a new one")
         checkpoint.check_compatible(state["meta"], self.meta)
-        self.agent.load_state_dict(state["agent"])
+        self.agent.load_state_dict(_placed(state["agent"], self.generator.device))
         self.samples, self.iteration = state["samples"], state["iteration"]
         self.generator.set_state(state["generator"])
         self.watch.load_state_dict(state["watch"])
         if "env" in state:
             self.env.load_state_dict(state["env"])  # type: ignore
             self._episodes.load_state_dict(state["episodes"])
-            self._obs = state["obs"]
+            self._obs = _placed(state["obs"], self.generator.device)
         if self.logger is not None:
             self.logger.resume(self.samples)
+
+
+def _placed(state: Any, device: torch.device) -> Any:
+    """The tensors of a nested dict on the device."""
+    if isinstance(state, Mapping):
+        return {name: _placed(value, device) for name, value in state.items()}
+    return state.to(device) if isinstance(state, Tensor) else state
