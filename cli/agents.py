@@ -41,7 +41,7 @@ AGENTS = {
 
 def make_agent(name: str, config: Any, env: HumanoidVectorEnv, seed: int) -> tuple[Any, torch.Generator]:
     """The agent as it is before training, and the generator that it draws from: equal for equal arguments."""
-    generator = torch.Generator().manual_seed(seed)
+    generator = torch.Generator(env.device).manual_seed(seed)
     return AGENTS[name].make(env, env.demonstrations, config, generator), generator
 
 

@@ -24,6 +24,7 @@ from murmillo.cli.agents import checkpoint_meta, make_agent
 from murmillo.cli.ages import measure_ages
 from murmillo.cli.checks import check_clips, check_settings
 from murmillo.cli.config import TrainConfig
+from murmillo.cli.devices import CPU, for_training
 from murmillo.cli.errors import user_errors
 from murmillo.cli.evaluation.bench import Request
 from murmillo.cli.evaluation.evaluating import evaluate
@@ -33,7 +34,11 @@ from murmillo.cli.evaluation.table import QUICK
 from murmillo.cli.metrics import TRAINING, Metric
 from murmillo.cli.progress import Progress, make_progress
 from murmillo.envs import HumanoidVectorEnv
+from murmillo.envs.devices import on
 from murmillo.envs.motion.licences import terms_of
+
+MATMUL = {"highest": "highest", "tf32": "high"}
+"""Torch's words for how exact products of matrices are."""
 
 FILM_S = 6
 """Length of the film: without a graphics card a second of it takes five to draw."""
@@ -53,11 +58,12 @@ def train(config: TrainConfig, suffix: str = "") -> int:
     config.run.name = name
     check_clips(config)
     torch.set_num_threads(config.threads or versions.usable_cores())
-    env = HumanoidVectorEnv(config.num_envs, config.env)
+    torch.set_float32_matmul_precision(MATMUL[config.matmul])
+    env = HumanoidVectorEnv(config.num_envs, for_training(config.env))
     try:
         if not resuming:
             runs.make(folder)
-        with undone_by_mistakes(folder, resuming):
+        with undone_by_mistakes(folder, resuming), on(env.device):
             describe(folder, config)
             return _train(config, env, folder, resuming)
     finally:
@@ -118,7 +124,8 @@ def _train(config: TrainConfig, env: HumanoidVectorEnv, folder: Path, resuming: 
         report.write(folder)
         print(f"stopped at {runner.samples:,} samples; go on with: murmillo train run.resume={folder}")
         return 0
-    _finish(config, folder)
+    with on(CPU):
+        _finish(config, folder)
     return 0
 
 

@@ -15,7 +15,7 @@ from murmillo.agents.common.errors import AgentError
 from murmillo.agents.common.interface import Agent, Obs, Steerable
 from murmillo.agents.common.rollout import Rollout, taken, tensors, true_next_obs
 
-Results = tuple[dict[str, np.ndarray], np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]
+Results = tuple[dict[str, Any], Any, Any, Any, dict[str, Any]]
 """What `step` gives: observations, reward `[N]`, terminated `[N]`, truncated `[N]`, infos."""
 
 LatentTerms = Callable[[Tensor, Obs], Mapping[str, Tensor]]
@@ -128,7 +128,8 @@ class LatentEnv(VectorWrapper):
             decision.add(results, {**judged, **chosen})
         obs, *_ = results
         outcome = decision.outcome(self.config.steps)
-        return obs, *(outcome if self.tensors else _arrays(outcome))
+        reward, terminated, truncated, infos = outcome if self.tensors else _arrays(outcome)
+        return obs, reward, terminated, truncated, infos
 
     @property
     def tensors(self) -> bool:

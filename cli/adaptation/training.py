@@ -21,11 +21,13 @@ from murmillo.cli.adaptation.config import AdaptNetTrainConfig
 from murmillo.cli.adaptation.evaluating import evaluate
 from murmillo.cli.adaptation.metrics import TRAINING
 from murmillo.cli.adaptation.world import agent_meta, check_base, make_agent, make_env
+from murmillo.cli.devices import CPU
 from murmillo.cli.evaluation.identity import clip_digests
 from murmillo.cli.progress import Progress
 from murmillo.cli.tasks import table
 from murmillo.cli.training import describe, film, follow, undone_by_mistakes
 from murmillo.envs import HumanoidVectorEnv
+from murmillo.envs.devices import on
 from murmillo.envs.motion.licences import terms_of
 
 
@@ -44,11 +46,11 @@ def train(config: AdaptNetTrainConfig, suffix: str = "") -> int:
     if resuming:
         check_base(base, checkpoint.load(folder / runs.LAST))
     torch.set_num_threads(config.threads or versions.usable_cores())
-    env = make_env(config, config.num_envs)
+    env = make_env(config, config.num_envs, training=True)
     try:
         if not resuming:
             runs.make(folder)
-        with undone_by_mistakes(folder, resuming):
+        with undone_by_mistakes(folder, resuming), on(env.device):
             describe(folder, config)
             return _train(config, base, env, folder, resuming)
     finally:
@@ -88,7 +90,8 @@ def _train(
         report.write(folder)
         print(f"stopped at {runner.samples:,} samples; go on with: murmillo train run.resume={folder}")
         return 0
-    _finish(config, base, folder)
+    with on(CPU):
+        _finish(config, base, folder)
     return 0
 
 

@@ -10,6 +10,7 @@ from murmillo.agents.common import checkpoint
 from murmillo.agents.common.logger import Logger
 from murmillo.agents.common.runner import Runner
 from murmillo.cli import runs, versions
+from murmillo.cli.devices import CPU
 from murmillo.cli.evaluation.identity import clip_digests
 from murmillo.cli.tasks import low, report, table
 from murmillo.cli.tasks.checks import check_settings
@@ -19,6 +20,7 @@ from murmillo.cli.tasks.low import LowRun
 from murmillo.cli.tasks.metrics import training_metrics
 from murmillo.cli.tasks.world import World, make_policy, policy_meta
 from murmillo.cli.training import describe, film, follow, undone_by_mistakes
+from murmillo.envs.devices import on
 from murmillo.envs.motion.licences import terms_of
 
 
@@ -44,7 +46,7 @@ def train(config: TaskTrainConfig, suffix: str = "") -> int:
     try:
         if not resuming:
             runs.make(folder)
-        with undone_by_mistakes(folder, resuming):
+        with undone_by_mistakes(folder, resuming), on(world.env.device):
             describe(folder, config)
             return _train(config, below, world, folder, resuming)
     finally:
@@ -71,7 +73,8 @@ def _train(config: TaskTrainConfig, below: LowRun | None, world: World, folder: 
         report.write(folder)
         print(f"stopped at {runner.samples:,} samples; go on with: murmillo train run.resume={folder}")
         return 0
-    _finish(config, below, folder)
+    with on(CPU):
+        _finish(config, below, folder)
     return 0
 
 
