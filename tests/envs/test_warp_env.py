@@ -58,7 +58,7 @@ def test_every_task_runs_in_float32_and_shows_tensors(name):
         torch.testing.assert_close(obs[key], value, atol=1e-4, rtol=1e-4, msg=f"{key} of the first observation")
     for _ in range(4):  # past the end of an episode
         obs, reward, terminated, truncated, info = env.step(torch.zeros(env.action_space.shape or ()))
-        flat = [*obs.values(), reward, terminated, truncated, info["healed"], *info["reward_terms"].values()]
+        flat: list[Any] = [*obs.values(), reward, terminated, truncated, info["healed"], *info["reward_terms"].values()]
         assert all(isinstance(value, torch.Tensor) for value in flat)
         assert all(torch.isfinite(value).all() for value in flat)
         assert not info["healed"].any()
