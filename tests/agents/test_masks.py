@@ -25,12 +25,17 @@ class Masked:
         self.made_up, self.everywhere = made_up, everywhere
 
     def __call__(
-        self, n: int, generator: torch.Generator, skill: Tensor | None = None, frames: int | None = None
+        self,
+        n: int,
+        generator: torch.Generator,
+        skill: Tensor | None = None,
+        frames: int | None = None,
+        rows: Tensor | slice | None = None,
     ) -> dict[str, Tensor]:
-        drawn = self.whole(n, generator, skill, frames)
-        rows = drawn["skill"] == 0 if self.skills > 1 else drawn["window"][:, -1, 2] > 0
-        mask = torch.zeros(n, 4, dtype=torch.bool)
-        mask[rows | self.everywhere, LEFT_OUT] = True
+        drawn = self.whole(n, generator, skill, frames, rows)
+        hidden = drawn["skill"] == 0 if self.skills > 1 else drawn["window"][:, -1, 2] > 0
+        mask = torch.zeros(len(hidden), 4, dtype=torch.bool)
+        mask[hidden | self.everywhere, LEFT_OUT] = True
         return {**drawn, "window": drawn["window"].masked_fill(mask[:, None], self.made_up), "mask": mask}
 
 
