@@ -66,12 +66,11 @@ def test_before_training_it_acts_as_its_base_to_the_last_bit(name: str, heights:
     before.model.policy.load_state_dict(base.policy)
     before.model.state_normalizer.load_state_dict(base.normalizer)
     after = make_adaptnet(env, torch.Generator().manual_seed(2), base, adapter=CONFIGS[name])
-    after.generator = before.generator = torch.Generator()
     obs = observe(env)
     for deterministic in (True, False):
         steps = []
         for agent in (before, after):
-            agent.generator.manual_seed(7)
+            agent.noise.generator = torch.Generator().manual_seed(7)
             steps.append(agent.act(obs, deterministic=deterministic))
         assert torch.equal(steps[0].action, steps[1].action)
         assert torch.equal(steps[0].log_prob, steps[1].log_prob)
