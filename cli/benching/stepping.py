@@ -51,15 +51,16 @@ def make_warm(
         SuiteError: the settings, the number of worlds or the task cannot be.
     """
     config = config or EnvConfig(window=10)
+    state = state or warm_state(config, copy.deepcopy(task))  # a task belongs to one environment
     env = HumanoidVectorEnv(num_envs, config, task)
     env.reset(seed=0)
-    env.load_state_dict(_copied(state or warm_state(config, task), num_envs))
+    env.load_state_dict(_copied(state, num_envs))
     return env
 
 
 def warm_state(config: EnvConfig, task: Task | None = None) -> dict[str, Any]:
     """The state of `_WARMED` worlds whose episodes are out of step."""
-    env = HumanoidVectorEnv(_WARMED, config, copy.deepcopy(task))  # a task belongs to one environment
+    env = HumanoidVectorEnv(_WARMED, config, task)
     env.reset(seed=0)
     for step in range(WARM_UP):
         env.step(noise(env, step))
