@@ -13,6 +13,7 @@ from murmillo.agents.calm.config import CALMConfig
 from murmillo.agents.case.agent import CASE
 from murmillo.agents.case.config import CASEConfig
 from murmillo.agents.common import checkpoint
+from murmillo.agents.common.ranks import ALONE, Ranks
 from murmillo.envs import HumanoidVectorEnv
 from murmillo.envs.observations import state_dim
 
@@ -39,10 +40,12 @@ AGENTS = {
 }
 
 
-def make_agent(name: str, config: Any, env: HumanoidVectorEnv, seed: int) -> tuple[Any, torch.Generator]:
+def make_agent(
+    name: str, config: Any, env: HumanoidVectorEnv, seed: int, ranks: Ranks = ALONE
+) -> tuple[Any, torch.Generator]:
     """The agent as it is before training, and the generator that it draws from: equal for equal arguments."""
     generator = torch.Generator().manual_seed(seed)
-    return AGENTS[name].make(env, env.demonstrations, config, generator), generator
+    return AGENTS[name].make(env, env.demonstrations, config, generator, ranks=ranks), generator
 
 
 def checkpoint_meta(name: str, config: Any, env: HumanoidVectorEnv) -> dict[str, Any]:

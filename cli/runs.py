@@ -31,6 +31,7 @@ EVALUATED_HTML = "evaluation.html"
 REPORT = "report.md"
 VIDEO = "video.mp4"
 FILMING = "filming.json"
+LAUNCH = "launch.json"
 PLOTS = "plots"
 
 

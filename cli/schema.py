@@ -4,6 +4,7 @@ OmegaConf knows no `Literal`, and gives lists for tuples: the schema is a twin i
 and `build` makes the true dataclass of a checked configuration.
 """
 
+import copyreg
 import dataclasses
 import types
 from collections.abc import Sequence
@@ -16,6 +17,9 @@ from omegaconf import MISSING
 from murmillo.cli.errors import CommandError, near_names
 
 T = TypeVar("T")
+
+# dataclasses know a missing default by its identity, which must outlast the way to the processes of a sweep and back
+copyreg.pickle(type(dataclasses.MISSING), lambda missing: "MISSING")
 
 
 @cache

@@ -12,6 +12,7 @@ from hydra.errors import OverrideParseException
 
 from murmillo.cli.config import compose_train, register, typed
 from murmillo.cli.errors import user_errors
+from murmillo.cli.launchers import chosen, shared_out
 from murmillo.cli.training import train
 from murmillo.cli.translate import command_error
 
@@ -21,8 +22,10 @@ CHECKED_COMBINATIONS = 1000
 
 def sweep(words: list[str]) -> int:
     """Check every combination, then run them all through hydra, whose launcher decides where."""
+    launcher = chosen(words)
     for combination in itertools.islice(combinations(words), CHECKED_COMBINATIONS):
         compose_train(list(combination))
+    words = shared_out(words, launcher, sum(1 for _ in combinations(words)))
     register()
     arguments, sys.argv = sys.argv, [sys.argv[0], "--multirun", *words]  # hydra reads the command line itself
     try:

@@ -1,5 +1,6 @@
 """`murmillo train`: one run, or with --multirun one for each combination of settings."""
 
+import sys
 from collections.abc import Callable
 from typing import Any
 
@@ -16,6 +17,8 @@ murmillo train: train an agent on motion clips
   murmillo train ablation=no_diversity               without a part of the method
   murmillo train run.resume=runs/<name>              take a stopped run up again
   murmillo train --multirun seed=1,2,3               one run for each value
+  murmillo train --multirun hydra/launcher=joblib seed=1,2,3    several at a time; also submitit_slurm, ray
+  torchrun --nproc-per-node=4 -m murmillo.cli.train num_envs=16384    one run by four processes (docs/scaling.md)
   murmillo train task=location low=runs/<name>       a task, by the skills of a trained agent
   murmillo train task=location low=none              the same task without an agent below
   murmillo train agent=adaptnet                      a humanoid that walks to places, the base of adaptations
@@ -79,7 +82,15 @@ def run(words: list[str]) -> int:
     from murmillo.cli.config import compose_train
     from murmillo.cli.training import train
 
-    return train(compose_train(settings))
+    return _train_one(compose_train, train, settings)
+
+
+def _train_one(compose: Callable[[list[str]], Any], train: Callable[..., int], words: list[str]) -> int:
+    """One run, of this process or of all that torchrun has started."""
+    from murmillo.cli.launch import agreed, launched
+
+    with launched() as ranks:
+        return train(agreed(ranks, lambda: compose(words)), ranks=ranks)
 
 
 def _train_task(words: list[str], multirun: bool) -> int:
@@ -100,10 +111,19 @@ def _train_adaptnet(words: list[str], multirun: bool) -> int:
 
 def _train_all(compose: Callable[[list[str]], Any], train: Callable[..., int], words: list[str], multirun: bool) -> int:
     if not multirun:
-        return train(compose(words))
+        return _train_one(compose, train, words)
+    from murmillo.cli.launchers import chosen
     from murmillo.cli.sweep import combinations
 
+    if (launcher := chosen(words)) is not None:
+        raise CommandError(f"hydra/launcher={launcher}: these runs are made one after the other; leave it out")
     configs = [compose(list(combination)) for combination in combinations(words)]  # a mistake shows before any run
     for number, config in enumerate(configs):
         train(config, suffix=f"-{number}")
     return 0
+
+
+if __name__ == "__main__":  # what torchrun starts: torchrun -m murmillo.cli.train agent=ase
+    from murmillo.cli.main import main
+
+    sys.exit(main(["train", *sys.argv[1:]]))

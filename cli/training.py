@@ -16,10 +16,11 @@ import torch
 from murmillo.agents.common import checkpoint
 from murmillo.agents.common.interface import Labelled
 from murmillo.agents.common.logger import Logger
+from murmillo.agents.common.ranks import ALONE, Ranks
 from murmillo.agents.common.runner import Runner
 from murmillo.agents.common.warm_start import warm_start
 from murmillo.cli import config as configuration
-from murmillo.cli import report, runs, versions
+from murmillo.cli import launch, report, runs, versions
 from murmillo.cli.agents import checkpoint_meta, make_agent
 from murmillo.cli.ages import measure_ages
 from murmillo.cli.checks import check_clips, check_settings
@@ -39,29 +40,44 @@ FILM_S = 6
 """Length of the film: without a graphics card a second of it takes five to draw."""
 
 
-def train(config: TrainConfig, suffix: str = "") -> int:
+def train(config: TrainConfig, suffix: str = "", ranks: Ranks = ALONE) -> int:
     """Train as the settings say; 0 also where a signal ended it early. `suffix` is put behind a default name.
+
+    Ranks that share the run all call this; the first one writes, and measures in the end.
 
     Raises:
         CommandError, SuiteError, AgentError: a mistake in the settings; a new run's folder is then not left behind.
     """
-    check_settings(config)
-    resuming = config.run.resume is not None
     choices = config.choices
+
+    def check() -> TrainConfig:
+        check_settings(config)
+        check_clips(config)
+        return config
+
+    launch.agreed(ranks, check)
     name = config.run.name or runs.default_name(choices["agent"], choices["budget"], config.seed, suffix)
-    folder = Path(config.run.resume) if config.run.resume else runs.vacant(config.run.root, name)
-    config.run.name = name
-    check_clips(config)
-    torch.set_num_threads(config.threads or versions.usable_cores())
-    env = HumanoidVectorEnv(config.num_envs, config.env)
+    folder, resuming = launch.open_run(config, name, ranks)
+    env = HumanoidVectorEnv(config.num_envs // ranks.size, launch.share_threads(config))
     try:
-        if not resuming:
-            runs.make(folder)
-        with undone_by_mistakes(folder, resuming):
-            describe(folder, config)
-            return _train(config, env, folder, resuming)
+        with kept(folder, config, resuming, ranks):
+            return _train(config, env, folder, resuming, ranks)
     finally:
         env.close()
+
+
+@contextmanager
+def kept(folder: Path, config: Any, resuming: bool, ranks: Ranks = ALONE) -> Iterator[None]:
+    """Within, the run's folder is there, with its settings; only the first rank has a hand in that."""
+    if not ranks.first:
+        yield
+        return
+    if not resuming:
+        runs.make(folder)
+        launch.mark(folder)
+    with undone_by_mistakes(folder, resuming):
+        describe(folder, config)
+        yield
 
 
 @contextmanager
@@ -86,9 +102,8 @@ def describe(folder: Path, config: Any) -> None:
     runs.write_json(folder / runs.VERSIONS, versions.describe(torch.get_num_threads()))
 
 
-def _train(config: TrainConfig, env: HumanoidVectorEnv, folder: Path, resuming: bool) -> int:
-    agent, generator = make_agent(config.choices["agent"], config.agent, env, config.seed)
-    logger = Logger(folder)
+def _train(config: TrainConfig, env: HumanoidVectorEnv, folder: Path, resuming: bool, ranks: Ranks) -> int:
+    agent, generator = make_agent(config.choices["agent"], config.agent, env, config.seed, ranks)
     runner = Runner(
         env,
         agent,
@@ -96,22 +111,26 @@ def _train(config: TrainConfig, env: HumanoidVectorEnv, folder: Path, resuming: 
         generator,
         folder / runs.LAST,
         meta=checkpoint_meta(config.choices["agent"], config.agent, env),
-        logger=logger,
+        logger=Logger(folder) if ranks.first else None,
+        ranks=ranks,
     )
     if resuming:
         runner.load(folder / runs.LAST)
     terms = dataclasses.asdict(terms_of(env.library.clips))
     runner.meta |= {"terms": terms}  # after loading: they are kept with a checkpoint, and need not be those here
-    runs.write_json(folder / runs.TERMS, terms)
-    runs.write_json(folder / runs.CLIPS, clip_digests(env.library.clips))
-    opening = f"{folder}: {config.choices['agent']} on {len(env.library.clips)} clips, {config.num_envs} worlds"
+    if ranks.first:
+        runs.write_json(folder / runs.TERMS, terms)
+        runs.write_json(folder / runs.CLIPS, clip_digests(env.library.clips))
+    opening = f"{folder}: {config.choices['agent']} on {len(env.library.clips)} clips, {launch.worlds(config, ranks)}"
     keep = () if config.run.keep_every is None else (Keeper(runner, agent, config.run.keep_every, folder),)
 
     def begin(progress: Progress) -> None:
         if not resuming:
-            _warm_start(config, agent, env, generator, progress, folder)
+            _warm_start(config, runner, generator, progress)
 
     stopped = follow(runner, folder, opening, begin=begin, on_iteration=keep)
+    if not ranks.first:
+        return 0
     _keep_skills(agent, env, folder)
     if stopped:
         (folder / runs.MEASURES).unlink(missing_ok=True)  # of this run when it had ended before: no longer its figures
@@ -134,7 +153,7 @@ def follow(
     """Run it to its end, or to a signal's, under a display of its progress; whether a signal ended it.
 
     Args:
-        runner: its notices are kept in the run's `folder`, its logger is closed.
+        runner: its notices are kept in the run's `folder`, by the first rank; its logger is closed.
         folder: of the run.
         opening: the first line.
         metrics: that are shown.
@@ -153,10 +172,11 @@ def follow(
         ]
         runner.on_warning = [lambda text: progress.say(f"warning: {text}")]
         runner.run()
-    runs.write_json(folder / runs.NOTICES, [dataclasses.asdict(notice) for notice in runner.watch.notices])
+    if runner.ranks.first:
+        runs.write_json(folder / runs.NOTICES, [dataclasses.asdict(notice) for notice in runner.watch.notices])
     if runner.logger is not None:
         runner.logger.close()
-    return stopped()
+    return runner.ranks.any(stopped())
 
 
 def _keep_skills(agent: Any, env: HumanoidVectorEnv, folder: Path) -> None:
@@ -167,24 +187,21 @@ def _keep_skills(agent: Any, env: HumanoidVectorEnv, folder: Path) -> None:
         runs.write_json(folder / runs.SKILLS, dict(zip(env.skills, skills, strict=True)))
 
 
-def _warm_start(
-    config: TrainConfig,
-    agent: Any,
-    env: HumanoidVectorEnv,
-    generator: torch.Generator,
-    progress: Progress,
-    folder: Path,
-) -> None:
+def _warm_start(config: TrainConfig, runner: Runner, generator: torch.Generator, progress: Progress) -> None:
     """Regress the policy on the clips' next poses, and keep what comes of it for the report."""
     if config.warm_start.steps == 0:
         return
+    agent: Any = runner.agent
+    env: Any = runner.env
     progress.say(f"warm start: {config.warm_start.steps} steps on the clips' own next poses")
     losses = warm_start(
         agent.model, env.demonstrations.imitation_pairs, config.warm_start, generator, agent.random_condition
     )
     progress.say(f"warm start: squared error of the action from {losses[0]:.4f} to {losses[-1]:.4f}")
-    meta = {**checkpoint_meta(config.choices["agent"], config.agent, env), "terms": runs.read_json(folder / runs.TERMS)}
-    checkpoint.save(folder / runs.WARM_STARTED, {"meta": meta, "agent": agent.state_dict()})
+    runner.ranks.copy_first(agent.model)  # all did the same, but not all processors round alike
+    state = {"meta": runner.meta, "agent": agent.state_dict()}
+    if runner.ranks.first:
+        checkpoint.save(runner.checkpoint_folder.with_name(Path(runs.WARM_STARTED).name), state)
 
 
 @contextmanager

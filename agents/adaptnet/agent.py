@@ -15,9 +15,11 @@ from murmillo.agents.adaptnet.spaces import Observed
 from murmillo.agents.common.adapter import INJECTION, AdaptedPolicy
 from murmillo.agents.common.discriminator import Windows
 from murmillo.agents.common.errors import AgentError
+from murmillo.agents.common.exploration import ActionNoise
 from murmillo.agents.common.interface import Demonstrations, Obs, Step
 from murmillo.agents.common.masks import FeatureMasks
 from murmillo.agents.common.ppo import PPO, Minibatch
+from murmillo.agents.common.ranks import ALONE, Ranks
 from murmillo.agents.common.rollout import Rollout
 from murmillo.agents.common.training import Means, adam, load_parts, minimise, named, state_of
 
@@ -38,6 +40,8 @@ class AdaptNet:
         config: AdaptNetConfig,
         generator: torch.Generator,
         base: Base | None = None,
+        *,
+        ranks: Ranks = ALONE,
     ) -> None:
         """
         Args:
@@ -47,6 +51,7 @@ class AdaptNet:
             config: hyperparameters.
             generator: draws weights, noise and minibatches.
             base: the policy to adapt; None to train one from nothing.
+            ranks: who train it together, each with an `env` of as many worlds.
 
         Raises:
             AgentError: environment, demonstrations, base and config do not fit together.
@@ -56,6 +61,7 @@ class AdaptNet:
         self.config = config
         self.demonstrations = demonstrations
         self.generator = generator
+        self.ranks = ranks
         self.base = None if base is None else base.digest
         self.model = make_model(self.observed, len(self.objectives), config, generator, base)
         self.ppo = PPO(self.model, config.ppo)
@@ -64,12 +70,18 @@ class AdaptNet:
         self._observe_demonstrations()
         self.masks = FeatureMasks(demonstrations)
         self.optimizer = adam((self.discriminator.parameters(), config.discriminator.learning_rate))
-        self._parts = {"ppo": self.ppo, "discriminator": self.discriminator, "optimizer": self.optimizer}
+        self.noise = ActionNoise(generator, config.ppo.noise_correlation, ranks)
+        self._parts = {
+            "ppo": self.ppo,
+            "noise": self.noise,
+            "discriminator": self.discriminator,
+            "optimizer": self.optimizer,
+        }
         self._playing = False
 
     def act(self, obs: Obs, *, deterministic: bool = False) -> Step:
         told = self.observed.beside(obs)
-        return Step(*self.model.act(self.observed.state(obs), told, self.generator, deterministic))
+        return Step(*self.model.act(self.observed.state(obs), told, None if deterministic else self.noise))
 
     def value(self, obs: Obs, extras: dict[str, Tensor]) -> Tensor:
         """Expected returns `[..., 2]` of goal and imitation."""
@@ -81,10 +93,10 @@ class AdaptNet:
     @torch.no_grad()
     def rewards(self, rollout: Rollout) -> dict[str, Tensor]:
         """Eq. 11 as the term "imitation" `[T, N]`."""
-        scores = [
-            imitation_reward(self.discriminator.logits(window, mask=self.masks.draw(len(window), self.generator)))
-            for window in rollout["next_window"]
-        ]
+        scores, worlds = [], rollout.ranks.worlds(rollout.num_envs)
+        for window in rollout["next_window"]:
+            mask = self.masks.draw(len(window), self.generator, part=worlds)
+            scores.append(imitation_reward(self.discriminator.logits(window, mask=mask)))
         return {"imitation": torch.stack(scores)}
 
     def update(self, rollout: Rollout) -> dict[str, float]:
@@ -98,23 +110,23 @@ class AdaptNet:
         generator, config, means = self.generator, self.config.discriminator, Means()
         windows = rollout.flat("next_window")
         for _ in range(config.epochs):
-            for rows in rollout.minibatches(config.minibatch, generator):
-                drawn = self.demonstrations(len(rows), generator)
-                agent = Windows(windows[rows], mask=self.masks.draw(len(rows), generator))
-                demonstration = Windows(drawn["window"], mask=drawn.get("mask"))
+            for rows, part in rollout.minibatches(config.minibatch, generator):
+                drawn = part.drawn(self.demonstrations, generator)
+                agent = Windows(windows[rows], mask=self.masks.draw(len(rows), generator, part=part), part=part)
+                demonstration = Windows(drawn["window"], mask=drawn.get("mask"), part=part)
                 loss = hinge_loss(self.discriminator, agent, demonstration, config.gradient_penalty, generator)
-                minimise(self.optimizer, loss.parts)
+                minimise(self.optimizer, loss.parts, ranks=rollout.ranks)
                 means.add({**loss.parts, **loss.scores})
 
         told = self.observed.told
-        seen = Rollout(*rollout.shape)
+        seen = Rollout(*rollout.shape, rollout.ranks)
         for name in ("action", "log_prob", "advantage", "return", *told):
             seen[name] = rollout[name]
         seen["state"] = self.observed.state({"state": rollout["state"]})
         ppo = self.ppo.update(seen, generator, fields=told, condition=self._tell, extra_loss=self._regularise)
-        self.discriminator.normalizer.update(rollout["next_window"])
+        self.discriminator.normalizer.update(rollout["next_window"], ranks=rollout.ranks)
         self._observe_demonstrations()
-        return named("discriminator", means.result()) | named("ppo", ppo)
+        return named("discriminator", means.result(rollout.ranks)) | named("ppo", ppo)
 
     def blend(self, alpha: float) -> None:
         """How much of the adaptation acts, in [0, 1]; of two, alpha of the first and 1 - alpha of the second.

@@ -16,6 +16,7 @@ from murmillo.agents.common.discriminator import (
 )
 from murmillo.agents.common.networks import mlp
 from murmillo.agents.common.numbers import check_at_least
+from murmillo.agents.common.ranks import ALONE, Part
 from murmillo.agents.common.recurrent import LastOutput
 
 
@@ -92,7 +93,8 @@ class HingeLoss(NamedTuple):
 def hinge_loss(
     ensemble: Ensemble, agent: Windows, demonstration: Windows, penalty: float, generator: torch.Generator
 ) -> HingeLoss:
-    """Eq. 10 as named parts, on equally many windows `[B, W, D]` of the agent and of demonstrations.
+    """Eq. 10 as named parts, on equally many windows `[B, W, D]` of the agent and of demonstrations,
+    which are the same part of theirs.
 
         mean max(0, 1 + D_n(agent)) + mean max(0, 1 - D_n(demonstration)) + lambda E (||d sum_n D_n / dx|| - 1)^2
 
@@ -102,7 +104,9 @@ def hinge_loss(
     real = ensemble.prepare(demonstration.window, demonstration.mask)
     fake = ensemble.prepare(agent.window, agent.mask)
     real_logits, fake_logits = (ensemble.judge(ensemble.features(x)) for x in (real, fake))
-    between = torch.lerp(fake, real, torch.rand(len(real), 1, generator=generator)).requires_grad_()
+    part = agent.part or Part(ALONE, len(real))
+    share = part.of(torch.rand(part.total, 1, generator=generator))
+    between = torch.lerp(fake, real, share).requires_grad_()
     gradient = input_gradient(ensemble.judge(ensemble.features(between)), between)
     parts = {
         "agent": F.relu(1 + fake_logits).mean(),
@@ -116,7 +120,7 @@ def hinge_loss(
             "agent_accuracy": (fake_logits.mean(1) < 0).float().mean(),
             "demonstration_accuracy": (real_logits.mean(1) > 0).float().mean(),
         }
-    return HingeLoss(parts, scores)
+    return HingeLoss(part.weigh(parts), part.weigh(scores))
 
 
 def imitation_reward(logits: Tensor) -> Tensor:

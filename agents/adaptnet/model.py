@@ -55,7 +55,7 @@ class HistoryActorCritic(ActorCritic):
 
     def targets(self, rollout: Rollout) -> Tensor:
         """Normalised returns `[T N, C]`, by statistics that already know them: PopArt's update moves no prediction."""
-        self.return_normalizer.update(rollout["return"])
+        self.return_normalizer.update(rollout["return"], ranks=rollout.ranks)
         return super().targets(rollout)
 
     def observe(self, rollout: Rollout) -> None:
@@ -63,7 +63,7 @@ class HistoryActorCritic(ActorCritic):
         states = rollout["state"]
         if LENGTH in rollout:
             states = states[torch.arange(states.shape[-2]) < rollout[LENGTH][..., None]]
-        self.state_normalizer.update(states)
+        self.state_normalizer.update(states, ranks=rollout.ranks)
 
 
 def make_model(

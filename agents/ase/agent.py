@@ -10,10 +10,12 @@ from murmillo.agents.ase.config import ASEConfig
 from murmillo.agents.ase.encoder import Encoder
 from murmillo.agents.common.dimensions import dimensions
 from murmillo.agents.common.discriminator import Discriminator, Windows, discriminator_loss, style_reward
+from murmillo.agents.common.exploration import ActionNoise
 from murmillo.agents.common.interface import Demonstrations, Obs, Step
 from murmillo.agents.common.latents import LatentSequence, sample_sphere
 from murmillo.agents.common.masks import FeatureMasks
 from murmillo.agents.common.ppo import PPO, ActorCritic, Minibatch
+from murmillo.agents.common.ranks import ALONE, Ranks
 from murmillo.agents.common.replay import Replay
 from murmillo.agents.common.rollout import Rollout
 from murmillo.agents.common.skill_discovery import diversity_loss, encoder_loss, skill_reward
@@ -26,7 +28,13 @@ class ASE:
     needs = frozenset({"state", "next_state", "next_window"})
 
     def __init__(
-        self, env: VectorEnv, demonstrations: Demonstrations, config: ASEConfig, generator: torch.Generator
+        self,
+        env: VectorEnv,
+        demonstrations: Demonstrations,
+        config: ASEConfig,
+        generator: torch.Generator,
+        *,
+        ranks: Ranks = ALONE,
     ) -> None:
         """
         Args:
@@ -34,6 +42,7 @@ class ASE:
             demonstrations: windows of the reference motions.
             config: hyperparameters.
             generator: draws weights, latents, noise and minibatches.
+            ranks: who train it together, each with an `env` of as many worlds.
 
         Raises:
             AgentError: environment or demonstrations give no windows of `config.window` frames.
@@ -43,11 +52,13 @@ class ASE:
         self.latent_dim = config.latent_dim
         self.demonstrations = demonstrations
         self.generator = generator
-        self.latents = LatentSequence(env.num_envs, config.latent_dim, generator, *config.latent_steps)
+        self.ranks = ranks
+        self.latents = LatentSequence(env.num_envs, config.latent_dim, generator, *config.latent_steps, ranks=ranks)
         self.model = ActorCritic(state_dim, action_dim, config.latent_dim, config.ppo, generator)
         self.ppo = PPO(self.model, config.ppo)
+        self.noise = ActionNoise(generator, config.ppo.noise_correlation, ranks)
         hidden = config.discriminator.hidden
-        self.discriminator = Discriminator(config.window, state_dim, config.discriminator, generator)
+        self.discriminator = Discriminator(config.window, state_dim, config.discriminator, generator, ranks=ranks)
         # known before the first update, lest that judges windows in raw units and every later one in other units
         self._observe_demonstrations()
         self.masks = FeatureMasks(demonstrations)
@@ -55,9 +66,10 @@ class ASE:
         self.optimizer = adam(
             ([*self.discriminator.parameters(), *self.encoder.parameters()], config.discriminator.learning_rate)
         )
-        self.replay = Replay(config.discriminator.replay_size, config.discriminator.replay_keep)
+        self.replay = Replay(config.discriminator.replay_size, config.discriminator.replay_keep, ranks)
         self._parts = {
             "ppo": self.ppo,
+            "noise": self.noise,
             "discriminator": self.discriminator,
             "encoder": self.encoder,
             "optimizer": self.optimizer,
@@ -68,7 +80,7 @@ class ASE:
     def act(self, obs: Obs, *, deterministic: bool = False) -> Step:
         """Lines 9-11: one step under the sequence of latents; the mean action if deterministic."""
         latent = self.latents.step()
-        action, log_prob = self.model.act(obs["state"], latent, self.generator, deterministic)
+        action, log_prob = self.model.act(obs["state"], latent, None if deterministic else self.noise)
         return Step(action, log_prob, {"latent": latent})
 
     def value(self, obs: Obs, extras: dict[str, Tensor]) -> Tensor:
@@ -80,10 +92,10 @@ class ASE:
     @torch.no_grad()
     def rewards(self, rollout: Rollout) -> dict[str, Tensor]:
         """Line 13: r = -log(1 - D(s, s')) + beta log q(z | s, s'), as two terms `[T, N]`."""
-        config = self.config
+        config, worlds = self.config, rollout.ranks.worlds(rollout.num_envs)
         style, skill = [], []
         for window, latent in zip(rollout["next_window"], rollout["latent"], strict=True):
-            x = self.discriminator.prepare(window, self.masks.draw(len(window), self.generator))
+            x = self.discriminator.prepare(window, self.masks.draw(len(window), self.generator, part=worlds))
             features = self.discriminator.features(x)
             style.append(style_reward(self.discriminator.judge(features)))
             skill.append(skill_reward(self.encoder(x, features), latent, config.kappa, config.skill_reward))
@@ -98,21 +110,21 @@ class ASE:
 
         # lines 18-28: encoder and discriminator are one network (section 8.2), so that one loop updates both
         for _ in range(config.discriminator.updates):
-            rows = torch.randint(len(windows), (k,), generator=generator)
+            rows, part = rollout.draw(k, generator)
             agent = windows[rows]
-            replay = self.replay.sample(k, generator)["window"] if len(self.replay) else agent
-            drawn = self.demonstrations(k, generator)
+            replay, old = self.replay.sample(k, generator) if len(self.replay) else ({"window": agent}, part)
+            drawn = part.drawn(self.demonstrations, generator)
             loss = discriminator_loss(
                 self.discriminator,
-                agent=Windows(agent, mask=self.masks.draw(k, generator)),
-                replay=Windows(replay, mask=self.masks.draw(k, generator)),
-                demonstration=Windows(drawn["window"], mask=drawn.get("mask")),
+                agent=Windows(agent, mask=self.masks.draw(k, generator, part=part), part=part),
+                replay=Windows(replay["window"], mask=self.masks.draw(k, generator, part=old), part=old),
+                demonstration=Windows(drawn["window"], mask=drawn.get("mask"), part=part),
             )
             losses = dict(loss.parts)
             if config.skill_discovery:
                 mu_q = self.encoder(loss.agent_inputs, loss.agent_features)
-                losses["encoder"] = encoder_loss(mu_q, latents[rows], config.kappa)
-            minimise(self.optimizer, losses)
+                losses["encoder"] = part.weight * encoder_loss(mu_q, latents[rows], config.kappa)
+            minimise(self.optimizer, losses, ranks=rollout.ranks)
             means.add({**losses, **loss.scores})
 
         # line 29: V and pi
@@ -123,10 +135,10 @@ class ASE:
             condition=lambda batch: batch["latent"],
             extra_loss=self._diversity,
         )
-        self.replay.add({"window": windows}, generator)
-        self.discriminator.normalizer.update(rollout["next_state"])
+        self.replay.add({"window": windows}, generator, rollout.part)
+        self.discriminator.normalizer.update(rollout["next_state"], ranks=rollout.ranks)
         self._observe_demonstrations()
-        return named("discriminator", means.result()) | named("ppo", ppo)
+        return named("discriminator", means.result(rollout.ranks)) | named("ppo", ppo)
 
     def draw_latents(self, n: int) -> Tensor:
         """Points of the sphere `[n, Z]`, drawn uniformly."""
@@ -148,7 +160,7 @@ class ASE:
         config = self.config
         if config.diversity == "none":
             return {}
-        z = sample_sphere(len(mean), config.latent_dim, self.generator)
+        z = batch.part.of(sample_sphere(batch.part.total, config.latent_dim, self.generator))
         other_mean = self.model.policy(batch["state"], z)
         std = self.model.policy.log_std.exp()
         loss = diversity_loss(mean, other_mean, batch["latent"], z, std, config.diversity)

@@ -13,9 +13,11 @@ from murmillo.agents.calm.losses import alignment_loss, uniformity_loss
 from murmillo.agents.calm.motions import MotionSequence, cut, select
 from murmillo.agents.common.dimensions import dimensions
 from murmillo.agents.common.discriminator import Discriminator, Windows, discriminator_loss, style_reward
+from murmillo.agents.common.exploration import ActionNoise
 from murmillo.agents.common.interface import Demonstrations, Obs, Step
 from murmillo.agents.common.latents import sample_sphere
 from murmillo.agents.common.ppo import PPO, ActorCritic, Minibatch
+from murmillo.agents.common.ranks import ALONE, Part, Ranks
 from murmillo.agents.common.replay import Replay
 from murmillo.agents.common.rollout import Rollout
 from murmillo.agents.common.training import Means, adam, load_parts, minimise, named, state_of
@@ -27,7 +29,13 @@ class CALM:
     needs = frozenset({"state", "next_state", "next_window"})
 
     def __init__(
-        self, env: VectorEnv, demonstrations: Demonstrations, config: CALMConfig, generator: torch.Generator
+        self,
+        env: VectorEnv,
+        demonstrations: Demonstrations,
+        config: CALMConfig,
+        generator: torch.Generator,
+        *,
+        ranks: Ranks = ALONE,
     ) -> None:
         """
         Args:
@@ -35,6 +43,7 @@ class CALM:
             demonstrations: windows of the reference motions, of as many frames as asked for.
             config: hyperparameters.
             generator: draws weights, motions, noise and minibatches.
+            ranks: who train it together, each with an `env` of as many worlds.
 
         Raises:
             AgentError: environment or demonstrations give no windows of `config.window` frames.
@@ -44,19 +53,24 @@ class CALM:
         self.latent_dim = config.latent_dim
         self.demonstrations = demonstrations
         self.generator = generator
+        self.ranks = ranks
         self.model = ActorCritic(state_dim, action_dim, config.latent_dim, config.ppo, generator)
         self.encoder = MotionEncoder(state_dim, config.latent_dim, config.encoder, generator)
         self.ppo = PPO(self.model, config.ppo, self.encoder.parameters())
+        self.noise = ActionNoise(generator, config.ppo.noise_correlation, ranks)
         condition = LatentCondition(config.latent_dim, config.discriminator_style_hidden, generator)
-        self.discriminator = Discriminator(config.window, state_dim, config.discriminator, generator, condition)
+        self.discriminator = Discriminator(
+            config.window, state_dim, config.discriminator, generator, condition, ranks=ranks
+        )
         self._observe_demonstrations()
         self.optimizer = adam((self.discriminator.parameters(), config.discriminator.learning_rate))
-        self.replay = Replay(config.discriminator.replay_size, config.discriminator.replay_keep)
+        self.replay = Replay(config.discriminator.replay_size, config.discriminator.replay_keep, ranks)
         self.motions = MotionSequence(
-            env.num_envs, config.latent_dim, config.latent_steps, generator, self._draw_motions, self.encoder
+            env.num_envs, config.latent_dim, config.latent_steps, generator, self._draw_motions, self.encoder, ranks
         )
         self._parts = {
             "ppo": self.ppo,
+            "noise": self.noise,
             "encoder": self.encoder,
             "discriminator": self.discriminator,
             "optimizer": self.optimizer,
@@ -89,7 +103,7 @@ class CALM:
         if deterministic:
             self.motions.forget()  # nothing is learnt from a mean action: a player keeps no more than it follows
         latent, motion = self.motions.step()
-        action, log_prob = self.model.act(obs["state"], latent, self.generator, deterministic)
+        action, log_prob = self.model.act(obs["state"], latent, None if deterministic else self.noise)
         mask = self.motions.mask(motion)
         extras = {"latent": latent, "motion": motion}
         return Step(action, log_prob, extras if mask is None else extras | {"mask": mask})
@@ -116,13 +130,15 @@ class CALM:
         pool = self._draw_motions(config.encoder.pool, config.encoder.frames + config.encoder.shift)
 
         for _ in range(config.discriminator.updates):
-            rows = torch.randint(len(windows), (k,), generator=generator)
-            agent = Windows(windows[rows], latents[rows], None if masks is None else masks[rows])
-            replay = Windows(**self.replay.sample(k, generator)) if len(self.replay) else agent
-            demonstration = self._encoded_demonstration(pool)
+            rows, part = rollout.draw(k, generator)
+            agent = replay = Windows(windows[rows], latents[rows], None if masks is None else masks[rows], part)
+            if len(self.replay):
+                remembered, old = self.replay.sample(k, generator)
+                replay = Windows(**remembered, part=old)
+            demonstration = self._encoded_demonstration(pool, part)
             negative = self._negative(demonstration)
             loss = discriminator_loss(self.discriminator, agent, replay, demonstration, negative)
-            minimise(self.optimizer, loss.parts)
+            minimise(self.optimizer, loss.parts, ranks=rollout.ranks)
             means.add({**loss.parts, **loss.scores})
         means.add({"agent_mismatched_score": self._mismatched_score(agent)})
 
@@ -131,14 +147,14 @@ class CALM:
             generator,
             fields=("motion",),
             condition=self._encode_batch,
-            extra_loss=lambda batch, mean: self._structure(pool),
+            other_loss=lambda: self._structure(pool),
         )
         remembered = {"window": windows, "condition": latents}
-        self.replay.add(remembered if masks is None else remembered | {"mask": masks}, generator)
-        self.discriminator.normalizer.update(rollout["next_state"])
+        self.replay.add(remembered if masks is None else remembered | {"mask": masks}, generator, rollout.part)
+        self.discriminator.normalizer.update(rollout["next_state"], ranks=rollout.ranks)
         self._observe_demonstrations()
         self.motions.encode_again()
-        return named("discriminator", means.result()) | named("ppo", ppo)
+        return named("discriminator", means.result(rollout.ranks)) | named("ppo", ppo)
 
     def _encode_batch(self, batch: Minibatch) -> Tensor:
         """z = E(M) `[B, Z]` of a minibatch's motions, with gradient; each motion is encoded once."""
@@ -146,12 +162,13 @@ class CALM:
         return self.encoder(self.motions.of(motions))[row]
 
     def _structure(self, pool: Windows) -> dict[str, Tensor]:
-        """Eqs. 5 and 6 on motions of the pool and their overlapping neighbours."""
+        """Eqs. 5 and 6 on motions of the pool and their overlapping neighbours, of which each rank encodes a share."""
         config = self.config.encoder
-        motions = self._some(pool, config.minibatch)
-        shift = torch.randint(config.shift + 1, (config.minibatch,), generator=self.generator)
-        z = self.encoder(cut(motions, torch.full_like(shift, config.shift), config.frames))
-        overlapping = self.encoder(cut(motions, config.shift - shift, config.frames))
+        share = self.ranks.share(config.minibatch)
+        motions = self._some(pool, share)
+        shift = share.of(torch.randint(config.shift + 1, (share.total,), generator=self.generator))
+        z = share.whole(self.encoder(cut(motions, torch.full_like(shift, config.shift), config.frames)))
+        overlapping = share.whole(self.encoder(cut(motions, config.shift - shift, config.frames)))
         return {
             "alignment": config.alignment_weight * alignment_loss(z, overlapping),
             "uniformity": config.uniformity_weight * uniformity_loss(z),
@@ -162,32 +179,37 @@ class CALM:
         return Windows(drawn["window"], mask=drawn.get("mask"))
 
     @torch.no_grad()
-    def _encoded_demonstration(self, pool: Windows) -> Windows:
-        """A minibatch of windows, each out of a motion of the pool, with the motion's encoding."""
-        config, n = self.config, self.config.discriminator.minibatch
-        motions = self._some(pool, n)
+    def _encoded_demonstration(self, pool: Windows, part: Part) -> Windows:
+        """A minibatch's part of windows, each out of a motion of the pool, with the motion's encoding."""
+        config = self.config
+        motions = self._some(pool, part)
         motions = motions._replace(window=motions.window[:, config.encoder.shift :])
-        first = torch.randint(config.encoder.frames - config.window + 1, (n,), generator=self.generator)
-        return cut(motions, first, config.window)._replace(condition=self.encoder(motions))
+        first = torch.randint(config.encoder.frames - config.window + 1, (part.total,), generator=self.generator)
+        return cut(motions, part.of(first), config.window)._replace(condition=self.encoder(motions), part=part)
 
-    def _some(self, pool: Windows, n: int) -> Windows:
-        return select(pool, torch.randint(len(pool.window), (n,), generator=self.generator))
+    def _some(self, pool: Windows, part: Part) -> Windows:
+        """A part of motions drawn from the pool."""
+        return select(pool, part.of(torch.randint(len(pool.window), (part.total,), generator=self.generator)))
 
     def _negative(self, demonstration: Windows) -> Windows | None:
         """True windows with a latent that is not theirs."""
         if self.config.negatives == "none":
             return None
-        z = demonstration.condition
+        z, part = demonstration.condition, demonstration.part
         assert z is not None
+        assert part is not None
         if self.config.negatives == "sphere":
-            return demonstration._replace(condition=sample_sphere(len(z), z.shape[1], self.generator))
-        return demonstration._replace(condition=z.roll(1, 0))  # the rows are drawn independently
+            z = sample_sphere(part.total, self.latent_dim, self.generator)
+            return demonstration._replace(condition=part.of(z))
+        return demonstration._replace(condition=part.of(part.whole(z).roll(1, 0)))  # the rows are drawn independently
 
     @torch.no_grad()
     def _mismatched_score(self, agent: Windows) -> Tensor:
         """The discriminator's mean probability for the agent's windows under latents that they did not follow."""
         assert agent.condition is not None
-        return self.discriminator.logits(agent.window, agent.condition.roll(1, 0), agent.mask).sigmoid().mean()
+        assert agent.part is not None
+        other = agent.part.of(agent.part.whole(agent.condition).roll(1, 0))
+        return agent.weight * self.discriminator.logits(agent.window, other, agent.mask).sigmoid().mean()
 
     def _observe_demonstrations(self) -> None:
         """The discriminator's and the encoder's normalisers see the clips."""

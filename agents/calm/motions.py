@@ -8,6 +8,7 @@ from torch import Tensor
 
 from murmillo.agents.common.discriminator import Windows
 from murmillo.agents.common.latents import LatentSequence
+from murmillo.agents.common.ranks import ALONE, Part, Ranks
 
 
 class MotionSequence:
@@ -25,6 +26,7 @@ class MotionSequence:
         generator: torch.Generator,
         draw: Callable[[int], Windows],
         encode: Callable[[Windows], Tensor],
+        ranks: Ranks = ALONE,
     ) -> None:
         """
         Args:
@@ -34,12 +36,13 @@ class MotionSequence:
             generator: draws the durations.
             draw: gives n motions [n, F, D].
             encode: gives their latents [n, Z].
+            ranks: who draw together; all must then call `step` and `reset` at a time.
         """
         self._draw, self._encode = draw, encode
         # all motions that were followed since `forget`, as they came; a rollout speaks of them by their rows
         self._followed: list[Windows] = []
         self._number = torch.zeros(num_envs, dtype=torch.int64)
-        self._latents = LatentSequence(num_envs, latent_dim, generator, *steps, draw=self._begin)
+        self._latents = LatentSequence(num_envs, latent_dim, generator, *steps, draw=self._begin, ranks=ranks)
 
     def step(self) -> tuple[Tensor, Tensor]:
         """The latents of this step [N, Z] and the number [N] of the motion that each encodes."""
@@ -74,8 +77,9 @@ class MotionSequence:
         self._latents.latent.copy_(self._encode(self.of(self._number)))
 
     @torch.no_grad()
-    def _begin(self, env_ids: Tensor) -> Tensor:
-        new = self._draw(len(env_ids))
+    def _begin(self, env_ids: Tensor, part: Part) -> Tensor:
+        drawn = self._draw(part.total)
+        new = Windows(part.of(drawn.window), mask=part.of(drawn.mask))
         known = sum(len(motions.window) for motions in self._followed)
         self._number[env_ids] = known + torch.arange(len(env_ids))
         self._followed.append(new)
@@ -93,13 +97,15 @@ class MotionSequence:
         self._number = torch.arange(len(self._number))
 
     def state_dict(self) -> dict[str, Any]:
-        followed = self.of(self._number)
-        mask = {} if followed.mask is None else {"mask": followed.mask}
-        return {"window": followed.window, **mask, "latents": self._latents.state_dict()}
+        """Of the worlds of all ranks, which must all ask for it."""
+        followed, worlds = self.of(self._number), self._latents.ranks.worlds(len(self._number))
+        mask = {} if followed.mask is None else {"mask": worlds.whole(followed.mask)}
+        return {"window": worlds.whole(followed.window), **mask, "latents": self._latents.state_dict()}
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
-        self._keep(Windows(state["window"].clone(), mask=state.get("mask")))
+        worlds = self._latents.ranks.worlds(len(self._number))
         self._latents.load_state_dict(state["latents"])
+        self._keep(Windows(worlds.of(state["window"]).clone(), mask=worlds.of(state.get("mask"))))
 
 
 def select(motions: Windows, rows: Tensor) -> Windows:

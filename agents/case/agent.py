@@ -11,10 +11,12 @@ from murmillo.agents.case.focal import FocalSampling
 from murmillo.agents.case.networks import Encoder, LabelEmbedding, SkillHeads
 from murmillo.agents.common.dimensions import dimensions, skill_count
 from murmillo.agents.common.discriminator import Discriminator, Windows, discriminator_loss, style_reward
+from murmillo.agents.common.exploration import ActionNoise
 from murmillo.agents.common.interface import Demonstrations, Obs, Step
 from murmillo.agents.common.latents import LatentSequence, sample_sphere
 from murmillo.agents.common.masks import FeatureMasks
 from murmillo.agents.common.ppo import PPO, ActorCritic, Minibatch
+from murmillo.agents.common.ranks import ALONE, Part, Ranks
 from murmillo.agents.common.replay import Replay
 from murmillo.agents.common.rollout import Rollout
 from murmillo.agents.common.skill_discovery import diversity_loss, encoder_loss, skill_reward
@@ -32,7 +34,13 @@ class CASE:
     needs = frozenset({"state", "next_state", "next_window"})
 
     def __init__(
-        self, env: VectorEnv, demonstrations: Demonstrations, config: CASEConfig, generator: torch.Generator
+        self,
+        env: VectorEnv,
+        demonstrations: Demonstrations,
+        config: CASEConfig,
+        generator: torch.Generator,
+        *,
+        ranks: Ranks = ALONE,
     ) -> None:
         """
         Args:
@@ -40,6 +48,7 @@ class CASE:
             demonstrations: windows of the reference motions, by label.
             config: hyperparameters.
             generator: draws weights, latents, noise and minibatches.
+            ranks: who train it together, each with an `env` of as many worlds.
 
         Raises:
             AgentError: environment or demonstrations give no windows of `config.window` frames, or no labels.
@@ -50,24 +59,29 @@ class CASE:
         self.latent_dim = config.latent_dim
         self.demonstrations = demonstrations
         self.generator = generator
-        self.latents = LatentSequence(env.num_envs, config.latent_dim, generator, *config.latent_steps)
+        self.ranks = ranks
+        self.latents = LatentSequence(env.num_envs, config.latent_dim, generator, *config.latent_steps, ranks=ranks)
         self.label = LabelEmbedding(labels, config.label_dim, generator)
         self.model = ActorCritic(state_dim, action_dim, config.latent_dim + config.label_dim, config.ppo, generator)
         self.ppo = PPO(self.model, config.ppo, self.label.parameters())
+        self.noise = ActionNoise(generator, config.ppo.noise_correlation, ranks)
         heads = SkillHeads(labels)
-        self.discriminator = Discriminator(config.window, state_dim, config.discriminator, generator, heads)
+        self.discriminator = Discriminator(
+            config.window, state_dim, config.discriminator, generator, heads, ranks=ranks
+        )
         self.encoder = Encoder(
             config.window * state_dim, config.encoder_hidden, config.latent_dim, labels, config.label_dim, generator
         )
         self.optimizer = adam(
             ([*self.discriminator.parameters(), *self.encoder.parameters()], config.discriminator.learning_rate)
         )
-        self.replay = Replay(config.discriminator.replay_size, config.discriminator.replay_keep)
+        self.replay = Replay(config.discriminator.replay_size, config.discriminator.replay_keep, ranks)
         self.focal = FocalSampling(labels, config)
         self.masks = FeatureMasks(demonstrations, labels)
         self.iterations = 0
         self._parts = {
             "ppo": self.ppo,
+            "noise": self.noise,
             "discriminator": self.discriminator,
             "encoder": self.encoder,
             "optimizer": self.optimizer,
@@ -81,7 +95,8 @@ class CASE:
     def act(self, obs: Obs, *, deterministic: bool = False) -> Step:
         """One step under the labels that are commanded now and the sequence of latents."""
         latent, label = self.latents.step(), obs["skill"]
-        action, log_prob = self.model.act(obs["state"], self.condition(latent, label), self.generator, deterministic)
+        told = self.condition(latent, label)
+        action, log_prob = self.model.act(obs["state"], told, None if deterministic else self.noise)
         return Step(action, log_prob, {"latent": latent, "label": label})
 
     def condition(self, latent: Tensor, label: Tensor) -> Tensor:
@@ -107,9 +122,10 @@ class CASE:
     def rewards(self, rollout: Rollout) -> dict[str, Tensor]:
         """r = -log(1 - D(s, s', c)) + beta log q(z | s, s', c) (section 3.1), as two terms `[T, N]`."""
         config, style, skill = self.config, [], []
+        worlds = rollout.ranks.worlds(rollout.num_envs)
         fields = ("next_window", "label", "latent")
         for window, label, latent in zip(*(rollout[name] for name in fields), strict=True):
-            x = self.discriminator.prepare(window, self._masks_for(label))
+            x = self.discriminator.prepare(window, self._masks_for(label, worlds))
             style.append(style_reward(self.discriminator.judge(self.discriminator.features(x), label)))
             skill.append(skill_reward(self.encoder(x, label), latent, config.kappa, config.skill_reward))
         terms = {"style": torch.stack(style)}
@@ -122,15 +138,17 @@ class CASE:
         k = config.discriminator.minibatch
 
         for _ in range(config.discriminator.updates):
-            rows = torch.randint(len(windows), (k,), generator=generator)
-            agent = self._agent_windows(windows[rows], labels[rows])
-            replay = self._agent_windows(**self.replay.sample(k, generator)) if len(self.replay) else agent
-            loss = discriminator_loss(self.discriminator, agent, replay, self._draw_demonstrations())
+            rows, part = rollout.draw(k, generator)
+            agent = replay = self._agent_windows(windows[rows], labels[rows], part)
+            if len(self.replay):
+                remembered, old = self.replay.sample(k, generator)
+                replay = self._agent_windows(remembered["window"], remembered["label"], old)
+            loss = discriminator_loss(self.discriminator, agent, replay, self._draw_demonstrations(part))
             losses = dict(loss.parts)
             if config.skill_discovery:
                 mu_q = self.encoder(loss.agent_inputs, labels[rows])
-                losses["encoder"] = encoder_loss(mu_q, latents[rows], config.kappa)
-            minimise(self.optimizer, losses)
+                losses["encoder"] = part.weight * encoder_loss(mu_q, latents[rows], config.kappa)
+            minimise(self.optimizer, losses, ranks=rollout.ranks)
             means.add({**losses, **loss.scores})
 
         ppo = self.ppo.update(
@@ -143,11 +161,11 @@ class CASE:
         demonstrations = self._draw_demonstrations()
         heads = self._practise(rollout, demonstrations)
         self.iterations += 1
-        self.replay.add({"window": windows, "label": labels}, generator)
-        self.discriminator.normalizer.update(rollout["next_state"])
+        self.replay.add({"window": windows, "label": labels}, generator, rollout.part)
+        self.discriminator.normalizer.update(rollout["next_state"], ranks=rollout.ranks)
         self._observe(demonstrations)
         return (
-            named("discriminator", means.result())
+            named("discriminator", means.result(rollout.ranks))
             | named("heads", heads)
             | named("focal", self.focal.scalars())
             | named("ppo", ppo)
@@ -172,8 +190,11 @@ class CASE:
     @torch.no_grad()
     def head_scores(self, rollout: Rollout) -> dict[str, Tensor]:
         """Probabilities `[T, N]` that the commanded skill's head gives, "right", and the mean of all "other" heads."""
-        steps = zip(rollout["next_window"], rollout["label"], strict=True)
-        scores = [self._heads(self._agent_windows(window, label)) for window, label in steps]
+        steps, worlds = (
+            zip(rollout["next_window"], rollout["label"], strict=True),
+            rollout.ranks.worlds(rollout.num_envs),
+        )
+        scores = [self._heads(self._agent_windows(window, label, worlds)) for window, label in steps]
         return {name: torch.stack([score[name] for score in scores]) for name in scores[0]}
 
     @torch.no_grad()
@@ -185,9 +206,10 @@ class CASE:
         """
         agent = self.head_scores(rollout)
         started = self.iterations >= self.config.focal_start
-        self.focal.update(agent["right"].flatten(), rollout.flat("label"), active=started)
+        self.focal.update(agent["right"].flatten(), rollout.flat("label"), active=started, ranks=rollout.ranks)
         scores = {"agent": agent, "demonstration": self._heads(demonstrations)}
-        return {f"{who}_{head}": s.mean().item() for who, heads in scores.items() for head, s in heads.items()}
+        means = {f"{who}_{head}": s.mean().item() for who, heads in scores.items() for head, s in heads.items()}
+        return rollout.ranks.mean_scalars(means)
 
     def _heads(self, windows: Windows) -> dict[str, Tensor]:
         """Probabilities `[B]` that the head of each window's label gives, and the mean of all other heads, if any."""
@@ -197,17 +219,19 @@ class CASE:
         others = score.shape[1] - 1
         return {"right": right} | ({"other": (score.sum(1) - right) / others} if others else {})
 
-    def _agent_windows(self, window: Tensor, label: Tensor) -> Windows:
-        return Windows(window, label, self._masks_for(label))
+    def _agent_windows(self, window: Tensor, label: Tensor, part: Part | None = None) -> Windows:
+        return Windows(window, label, self._masks_for(label, part), part)
 
-    def _masks_for(self, label: Tensor) -> Tensor | None:
+    def _masks_for(self, label: Tensor, part: Part | None) -> Tensor | None:
         """What the demonstrations of the same skills leave out is left out too (adaptive masking, appendix A.5)."""
-        return self.masks.draw(len(label), self.generator, label)
+        return self.masks.draw(len(label), self.generator, label, part=part)
 
-    def _draw_demonstrations(self) -> Windows:
-        k = self.config.discriminator.minibatch
-        drawn = self.demonstrations(k, self.generator, self.focal.draw(k, self.generator))
-        return Windows(drawn["window"], drawn["skill"], drawn.get("mask"))
+    def _draw_demonstrations(self, part: Part | None = None) -> Windows:
+        """A minibatch of them, or a part of it."""
+        part = part or Part(ALONE, self.config.discriminator.minibatch)
+        skill = self.focal.draw(part.total, self.generator)
+        drawn = part.drawn(self.demonstrations, self.generator, skill=skill)
+        return Windows(drawn["window"], drawn["skill"], drawn.get("mask"), part)
 
     def _observe(self, demonstrations: Windows) -> None:
         self.discriminator.observe(demonstrations.window, demonstrations.mask)
@@ -217,7 +241,7 @@ class CASE:
         config = self.config
         if config.diversity == "none":
             return {}
-        z = sample_sphere(len(mean), config.latent_dim, self.generator)
+        z = batch.part.of(sample_sphere(batch.part.total, config.latent_dim, self.generator))
         other_mean = self.model.policy(batch["state"], self.condition(z, batch["label"]))
         std = self.model.policy.log_std.exp()
         loss = diversity_loss(mean, other_mean, batch["latent"], z, std, config.diversity)

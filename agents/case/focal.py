@@ -6,6 +6,7 @@ import torch
 from torch import Tensor
 
 from murmillo.agents.case.config import CASEConfig
+from murmillo.agents.common.ranks import ALONE, Ranks
 
 _TINY = 1e-6
 """Keeps a score that rounds to 0 or 1 inside, and the weight of an only skill, which fades by eq. 4, above 0."""
@@ -48,17 +49,18 @@ class FocalSampling:
         """Labels `[n]` int64."""
         return torch.multinomial(self.probability, n, replacement=True, generator=generator)
 
-    def update(self, scores: Tensor, labels: Tensor, active: bool = True) -> None:
+    def update(self, scores: Tensor, labels: Tensor, active: bool = True, *, ranks: Ranks = ALONE) -> None:
         """Eq. 4 once.
 
         Args:
             scores: D `[n]` of the agent's motions, in [0, 1]; a skill that has none keeps its last mean.
             labels: under which they were made `[n]`.
             active: whether the sampling follows the scores already.
+            ranks: who have motions each; all then come to the same weights.
         """
         config, skills = self.config, len(self.score)
-        count = torch.bincount(labels, minlength=skills)
-        mean = torch.zeros(skills).index_add(0, labels, scores) / count
+        count = ranks.sum(torch.bincount(labels, minlength=skills))
+        mean = ranks.sum(torch.zeros(skills).index_add(0, labels, scores)) / count
         self.score = torch.where(count > 0, mean, self.score).clamp(_TINY, 1 - _TINY)
         if config.focal == "none" or not active:
             return

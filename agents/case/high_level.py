@@ -18,8 +18,10 @@ from torch.nn import functional as F
 from murmillo.agents.common.decoder import Command, to_sphere
 from murmillo.agents.common.dimensions import skill_count
 from murmillo.agents.common.errors import AgentError
+from murmillo.agents.common.exploration import ActionNoise
 from murmillo.agents.common.networks import GaussianPolicy, linear
 from murmillo.agents.common.ppo import PPOConfig
+from murmillo.agents.common.ranks import ALONE, Ranks
 from murmillo.agents.common.task_agent import TaskAgent, TaskAgentConfig
 
 
@@ -104,10 +106,12 @@ class HybridPolicy(GaussianPolicy):
         """Logits of the labels and the latent's mean `[..., K + Z]`."""
         return torch.cat([self.label_head(features), self.head(features)], -1)
 
-    def sample(self, parameters: Tensor, generator: torch.Generator) -> Tensor:
+    def sample(self, parameters: Tensor, noise: ActionNoise) -> Tensor:
         logits, mean = self._split(parameters)
-        noise = -torch.empty_like(logits).exponential_(generator=generator).log()
-        return torch.cat([self._scores(logits + noise), super().sample(mean, generator)], -1)
+        worlds = noise.worlds(len(logits))
+        exponential = torch.empty(worlds.total, self.labels).exponential_(generator=noise.generator)
+        gumbel = -worlds.of(exponential).log()
+        return torch.cat([self._scores(logits + gumbel), super().sample(mean, noise)], -1)
 
     def mode(self, parameters: Tensor) -> Tensor:
         logits, mean = self._split(parameters)
@@ -142,7 +146,9 @@ class HybridPolicy(GaussianPolicy):
         return F.log_softmax(perturbed / self.gumbel, -1)
 
 
-def hybrid_agent(env: VectorEnv, config: HybridConfig, generator: torch.Generator) -> TaskAgent:
+def hybrid_agent(
+    env: VectorEnv, config: HybridConfig, generator: torch.Generator, *, ranks: Ranks = ALONE
+) -> TaskAgent:
     """A `TaskAgent` that chooses labels and latents, in a `LatentEnv` with a `HybridDecoder`.
 
     Raises:
@@ -156,4 +162,4 @@ def hybrid_agent(env: VectorEnv, config: HybridConfig, generator: torch.Generato
             width, labels, latent_dim, config.ppo, generator, condition_dim=condition_dim, gumbel=config.gumbel
         )
 
-    return TaskAgent(env, config, generator, make_policy)
+    return TaskAgent(env, config, generator, make_policy, ranks=ranks)

@@ -15,6 +15,7 @@ from torch import Tensor, nn
 from murmillo.agents.common.errors import AgentError
 from murmillo.agents.common.networks import Policy, Told
 from murmillo.agents.common.normalizer import RunningNormalizer
+from murmillo.agents.common.ranks import ALONE, Ranks
 
 INJECTION = "injection"
 """What a policy is told under this name is taken for its first adapter's injection, not computed anew."""
@@ -215,10 +216,10 @@ class Views(nn.Module):
         """`[..., V D]` from raw states `[..., D]`."""
         return torch.cat([normalizer(state) for normalizer in self.normalizers], -1)
 
-    def update(self, batch: Tensor) -> None:
+    def update(self, batch: Tensor, *, ranks: Ranks = ALONE) -> None:
         """Take in raw states `[..., D]`, in all views that are not frozen."""
         for normalizer in self.normalizers:
-            normalizer.update(batch)
+            normalizer.update(batch, ranks=ranks)
 
 
 def linear_layers(policy: Policy) -> list[nn.Linear]:

@@ -5,6 +5,8 @@ from collections.abc import Sequence
 import torch
 from torch import Tensor
 
+from murmillo.agents.common.ranks import ALONE, Ranks
+
 
 def gae(
     reward: Tensor, value: Tensor, next_value: Tensor, terminated: Tensor, done: Tensor, gamma: float, lam: float
@@ -37,16 +39,19 @@ def gae(
     return advantage
 
 
-def normalise_advantage(advantage: Tensor, eps: float = 1e-5) -> Tensor:
-    """Mean 0 and standard deviation 1 over the whole rollout, any shape."""
+def normalise_advantage(advantage: Tensor, eps: float = 1e-5, *, ranks: Ranks = ALONE) -> Tensor:
+    """Mean 0 and standard deviation 1 over the whole rollout, any shape, of all ranks together."""
     std, mean = torch.std_mean(advantage, correction=0)
+    if ranks.size > 1:
+        _, mean, var = ranks.moments(advantage.numel(), mean, std.square())
+        std = var.sqrt()
     return (advantage - mean) / (std + eps)
 
 
-def weigh_advantages(advantage: Tensor, weights: Sequence[float]) -> Tensor:
+def weigh_advantages(advantage: Tensor, weights: Sequence[float], *, ranks: Ranks = ALONE) -> Tensor:
     """What the policy follows, `[T, N]`: the sum of weight times normalised advantage over objectives `[T, N, C]`.
 
     Each objective is normalised by itself, so that none drowns the others by its scale (AdaptNet, eq. 9).
     """
-    normalised = [normalise_advantage(objective) for objective in advantage.unbind(-1)]
+    normalised = [normalise_advantage(objective, ranks=ranks) for objective in advantage.unbind(-1)]
     return torch.stack([weight * one for weight, one in zip(weights, normalised, strict=True)]).sum(0)

@@ -14,6 +14,7 @@ from torch.nn import functional as F
 from murmillo.agents.common.networks import Dropout, linear, mlp
 from murmillo.agents.common.normalizer import RunningNormalizer
 from murmillo.agents.common.numbers import check_at_least
+from murmillo.agents.common.ranks import ALONE, Part, Ranks
 
 
 @dataclass
@@ -58,11 +59,23 @@ class Windows(NamedTuple):
     Attributes:
         condition: what the discriminator is told about each, `[B, ...]` or nothing.
         mask: bool `[B, D]`, true where a feature is left out of all frames of a window; None leaves nothing out.
+        part: which of a batch of all ranks they are; None is all of it.
     """
 
     window: Tensor
     condition: Tensor | None = None
     mask: Tensor | None = None
+    part: Part | None = None
+
+    @property
+    def total(self) -> int:
+        """Windows of all ranks."""
+        return len(self.window) if self.part is None else self.part.total
+
+    @property
+    def weight(self) -> float:
+        """Of means over these windows, beside those of other ranks."""
+        return 1.0 if self.part is None else self.part.weight
 
 
 class Condition(nn.Module):
@@ -93,6 +106,7 @@ class Discriminator(nn.Module):
         generator: torch.Generator,
         condition: Condition | None = None,
         trunk: nn.Sequential | None = None,
+        ranks: Ranks = ALONE,
     ) -> None:
         """
         Args:
@@ -102,6 +116,7 @@ class Discriminator(nn.Module):
             generator: draws the initial weights.
             condition: what it is told beside the window.
             trunk: from its inputs `[B, W D + ...]` to features `[B, H]`; fully connected layers unless given.
+            ranks: who train it.
         """
         super().__init__()
         self.config = config
@@ -110,8 +125,8 @@ class Discriminator(nn.Module):
         # feature cannot be told from its place in it
         self.normalizer = RunningNormalizer((state_dim,))
         sizes = [frames * state_dim + self.condition.inputs, *config.hidden]
-        self.trunk = trunk or mlp(sizes, generator, config.dropout)
-        self.dropout = Dropout(config.dropout, generator)
+        self.trunk = trunk or mlp(sizes, generator, config.dropout, ranks=ranks)
+        self.dropout = Dropout(config.dropout, generator, ranks)
         self.head = linear(config.hidden[-1], self.condition.outputs, generator, bound=1.0)
         self.eval()
 
@@ -132,7 +147,7 @@ class Discriminator(nn.Module):
         return self.condition.pick(self.head(self.dropout(features)), condition)
 
     def logits(self, window: Tensor, condition: Tensor | None = None, mask: Tensor | None = None) -> Tensor:
-        """Logits `[B]` of raw windows `[B, W, D]`; the arguments are those of `Windows`."""
+        """Logits `[B]` of raw windows `[B, W, D]`; the arguments are the first of `Windows`."""
         return self.judge(self.features(self.prepare(window, mask), condition), condition)
 
 
@@ -181,28 +196,32 @@ def discriminator_loss(
     agent_inputs = discriminator.prepare(agent.window, agent.mask)
     agent_features = discriminator.features(agent_inputs, agent.condition)
     agent_logits = discriminator.judge(agent_features, agent.condition)
-    replay_logits = discriminator.logits(*replay)
+    replay_logits = discriminator.logits(*replay[:3])
 
-    fakes = {"agent": agent_logits, "replay": replay_logits}
+    fakes = {"agent": (agent, agent_logits), "replay": (replay, replay_logits)}
     if negative is not None:
-        fakes["negative"] = discriminator.logits(*negative)
+        fakes["negative"] = negative, discriminator.logits(*negative[:3])
     discriminator.eval()
-    share = 0.5 / sum(len(logits) for logits in fakes.values())
+    share = 0.5 / sum(windows.total for windows, _ in fakes.values())
+    real = demonstration.weight
     weights = [layer.weight for layer in discriminator.trunk if isinstance(layer, nn.Linear)]
     logit_square = discriminator.head.weight.square().sum()
     parts = {
-        **{name: share * F.softplus(logits).sum() for name, logits in fakes.items()},
-        "demonstration": 0.5 * F.softplus(-demo_logits).mean(),
-        "gradient_penalty": config.gradient_penalty * gradient_penalty(demo_logits, x),
+        **{
+            name: share * (windows.weight * windows.total / len(logits)) * F.softplus(logits).sum()
+            for name, (windows, logits) in fakes.items()
+        },
+        "demonstration": 0.5 * real * F.softplus(-demo_logits).mean(),
+        "gradient_penalty": config.gradient_penalty * real * gradient_penalty(demo_logits, x),
         "logit_decay": config.logit_decay * logit_square,
         "weight_decay": config.weight_decay * (logit_square + sum(weight.square().sum() for weight in weights)),
     }
     with torch.no_grad():
         scores = {
-            "agent_score": agent_logits.sigmoid().mean(),
-            "demonstration_score": demo_logits.sigmoid().mean(),
-            "agent_accuracy": (agent_logits < 0).float().mean(),
-            "demonstration_accuracy": (demo_logits > 0).float().mean(),
+            "agent_score": agent.weight * agent_logits.sigmoid().mean(),
+            "demonstration_score": real * demo_logits.sigmoid().mean(),
+            "agent_accuracy": agent.weight * (agent_logits < 0).float().mean(),
+            "demonstration_accuracy": real * (demo_logits > 0).float().mean(),
         }
     return DiscriminatorLoss(parts, scores, agent_inputs, agent_features)
 

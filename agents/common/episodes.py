@@ -6,6 +6,8 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from murmillo.agents.common.ranks import ALONE, Ranks
+
 
 class EpisodeStatistics:
     """Counts every world's steps; sums up the episodes that ended since the last `summary`."""
@@ -25,10 +27,11 @@ class EpisodeStatistics:
         self._steps += int(self.length[done].sum())
         self.length[done] = 0
 
-    def summary(self) -> dict[str, float]:
+    def summary(self, ranks: Ranks = ALONE) -> dict[str, float]:
         """Mean length [steps] and share of terminations among the episodes that ended; NaN where none did."""
-        ended = self._ended or math.nan
-        summary = {"episode/length": self._steps / ended, "episode/fall_rate": self._fallen / ended}
+        ended, fallen, steps = ranks.sum(torch.tensor([self._ended, self._fallen, self._steps])).tolist()
+        ended = ended or math.nan
+        summary = {"episode/length": steps / ended, "episode/fall_rate": fallen / ended}
         self._clear()
         return summary
 

@@ -118,10 +118,16 @@ class Demonstrations(Protocol):
     `frames` asks for windows of another length than the environment's; they lie within their clips where those are long
     enough, and begin with a clip's first frame, repeated, where not.
     A third entry, `mask` [n, D] bool, may say which features of a window are not to be judged by.
+    `rows` asks for these of the n only, drawn as if all were made; only a run of several ranks does.
     """
 
     def __call__(
-        self, n: int, generator: torch.Generator, skill: Tensor | None = None, frames: int | None = None
+        self,
+        n: int,
+        generator: torch.Generator,
+        skill: Tensor | None = None,
+        frames: int | None = None,
+        rows: Tensor | slice | None = None,
     ) -> dict[str, Tensor]: ...
 
 

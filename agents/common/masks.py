@@ -4,6 +4,7 @@ import torch
 from torch import Tensor
 
 from murmillo.agents.common.interface import Demonstrations
+from murmillo.agents.common.ranks import Part
 
 
 class FeatureMasks:
@@ -27,9 +28,15 @@ class FeatureMasks:
         mask = demonstrations((skills or 1) * draws, torch.Generator().manual_seed(0), skill, frames=1).get("mask")
         self._masks = None if mask is None or not mask.any() else mask.unflatten(0, (-1, draws))
 
-    def draw(self, n: int, generator: torch.Generator, skill: Tensor | None = None) -> Tensor | None:
-        """Masks `[n, D]` bool of demonstrations of the skills `[n]`; None, and no draw, if nothing is left out."""
+    def draw(
+        self, n: int, generator: torch.Generator, skill: Tensor | None = None, *, part: Part | None = None
+    ) -> Tensor | None:
+        """Masks `[n, D]` bool of demonstrations of the skills `[n]`; None, and no draw, if nothing is left out.
+
+        `part` says which rows of a batch the n are; it is drawn for all.
+        """
         if self._masks is None:
             return None
-        draw = torch.randint(self._masks.shape[1], (n,), generator=generator)
+        draw = torch.randint(self._masks.shape[1], (n if part is None else part.total,), generator=generator)
+        draw = draw if part is None else part.of(draw)
         return self._masks[0 if skill is None else skill, draw]

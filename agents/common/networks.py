@@ -9,7 +9,9 @@ import torch
 from torch import Tensor, nn
 
 from murmillo.agents.common.errors import AgentError
+from murmillo.agents.common.exploration import ActionNoise
 from murmillo.agents.common.losses import action_bound_loss, gaussian_entropy, gaussian_log_prob
+from murmillo.agents.common.ranks import ALONE, Ranks
 
 
 def linear(inputs: int, outputs: int, generator: torch.Generator, bound: float | None = None) -> nn.Linear:
@@ -24,20 +26,22 @@ def linear(inputs: int, outputs: int, generator: torch.Generator, bound: float |
 class Dropout(nn.Module):
     """In training mode hides each element with probability `rate` and scales up the others (Srivastava et al. 2014).
 
-    PyTorch's own draws from the global generator, whose state no checkpoint of ours keeps.
+    PyTorch's own draws from the global generator, whose state no checkpoint of ours keeps. Each rank draws for its own
+    rows only, since nothing else is drawn so much: several ranks hide other elements than a single process does.
     """
 
-    def __init__(self, rate: float, generator: torch.Generator) -> None:
+    def __init__(self, rate: float, generator: torch.Generator, ranks: Ranks = ALONE) -> None:
         super().__init__()
         if not 0 <= rate < 1:
             raise AgentError(f"dropout={rate} is no probability below 1; C·ASE has 0.2, and 0 leaves it out")
         self.rate = rate
         self.generator = generator
+        self.ranks = ranks
 
     def forward(self, x: Tensor) -> Tensor:
         if not self.training or self.rate == 0:
             return x
-        kept = torch.empty_like(x).bernoulli_(1 - self.rate, generator=self.generator)
+        kept = torch.empty_like(x).bernoulli_(1 - self.rate, generator=self.ranks.fork(self.generator))
         return x * kept / (1 - self.rate)
 
 
@@ -46,11 +50,12 @@ def mlp(
     generator: torch.Generator,
     dropout: float = 0.0,
     activation: Callable[[], nn.Module] = nn.ReLU,
+    ranks: Ranks = ALONE,
 ) -> nn.Sequential:
     """Layers of the given sizes, the input's first, with a ReLU after every one and dropout, if any, before it."""
     layers: list[nn.Module] = []
     for inputs, outputs in pairwise(sizes):
-        layers += [Dropout(dropout, generator)] if dropout else []
+        layers += [Dropout(dropout, generator, ranks)] if dropout else []
         layers += [linear(inputs, outputs, generator), activation()]
     return nn.Sequential(*layers)
 
@@ -104,10 +109,10 @@ class Policy(nn.Module):
         """Mean `[..., A]` and logarithm of the standard deviation, `[..., A]` or `[A]`."""
         return parameters, self.log_std
 
-    def sample(self, parameters: Tensor, generator: torch.Generator) -> Tensor:
-        """Actions `[..., A]` drawn from the distributions with these parameters."""
+    def sample(self, parameters: Tensor, noise: ActionNoise) -> Tensor:
+        """Actions `[N, A]` drawn from the distributions with these parameters `[N, P]`."""
         mean, log_std = self.moments(parameters)
-        return mean + log_std.exp() * torch.randn(mean.shape, generator=generator)
+        return mean + log_std.exp() * noise.step(*mean.shape)
 
     def mode(self, parameters: Tensor) -> Tensor:
         """The likeliest actions `[..., A]`."""

@@ -3,6 +3,8 @@
 import torch
 from torch import Tensor, nn
 
+from murmillo.agents.common.ranks import ALONE, Ranks
+
 
 class RunningNormalizer(nn.Module):
     """(x - mean) / sqrt(var + eps), clipped; the statistics are float64 and move only in `update`.
@@ -37,25 +39,27 @@ class RunningNormalizer(nn.Module):
         return torch.sqrt(self.var + self.eps).to(like.dtype)
 
     @torch.no_grad()
-    def update(self, batch: Tensor, left_out: Tensor | None = None) -> None:
+    def update(self, batch: Tensor, left_out: Tensor | None = None, *, ranks: Ranks = ALONE) -> None:
         """Take in a batch `[..., *shape]` (Chan et al.'s parallel form of Welford's algorithm).
 
         Args:
             batch: `[..., *shape]`.
             left_out: bool, broadcast to the batch's shape; true where an element says nothing. It then counts as if it
                 were like those of its feature that do, or like all before it where none does.
+            ranks: who have a batch each, of which nothing is left out; without them every rank has the same batch.
         """
         if self.frozen:
             return
         rows = batch.reshape(-1, *self.mean.shape).double()
-        total = self.count + len(rows)
         if left_out is None:
             var, mean = torch.var_mean(rows, dim=0, correction=0)
         else:
             var, mean = self._moments(rows, ~left_out.expand(batch.shape).reshape(rows.shape))
+        count, mean, var = ranks.moments(len(rows), mean, var)
+        total = self.count + count
         delta = mean - self.mean
-        moment = self.var * self.count + var * len(rows) + delta.square() * self.count * len(rows) / total
-        self.mean += delta * len(rows) / total
+        moment = self.var * self.count + var * count + delta.square() * self.count * count / total
+        self.mean += delta * count / total
         self.var.copy_(moment / total)
         self.count.copy_(total)
 

@@ -3,6 +3,8 @@
 import torch
 from torch import Tensor, nn
 
+from murmillo.agents.common.ranks import ALONE, Ranks
+
 
 class PopArt(nn.Module):
     """Mean and variance of C objectives' returns, each a moving average, and the critic's last layer that follows them.
@@ -39,14 +41,14 @@ class PopArt(nn.Module):
         return (y * self._std() + self.mean).to(y.dtype)
 
     @torch.no_grad()
-    def update(self, returns: Tensor) -> None:
-        """Take in returns `[..., C]` and rescale the critic's last layer."""
+    def update(self, returns: Tensor, *, ranks: Ranks = ALONE) -> None:
+        """Take in returns `[..., C]`, of each rank as many, and rescale the critic's last layer."""
         rows = returns.reshape(-1, len(self.mean)).double()
         old_mean, old_std = self.mean.clone(), self._std()
         self.weight += self.momentum * (1 - self.weight)
         share = self.momentum / self.weight  # 1 at first, then ever nearer to the momentum
-        self.mean += share * (rows.mean(0) - self.mean)
-        self.square += share * (rows.square().mean(0) - self.square)
+        self.mean += share * (ranks.mean(rows.mean(0)) - self.mean)
+        self.square += share * (ranks.mean(rows.square().mean(0)) - self.square)
         std = self._std()
         head = self._head[0]
         head.weight *= (old_std / std)[:, None].to(head.weight.dtype)

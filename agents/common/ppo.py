@@ -9,15 +9,26 @@ import torch
 from torch import Tensor, nn
 
 from murmillo.agents.common.errors import AgentError
+from murmillo.agents.common.exploration import ActionNoise
 from murmillo.agents.common.losses import approx_kl, clip_fraction, ppo_policy_loss, value_loss
 from murmillo.agents.common.networks import Critic, GaussianPolicy, Policy, Told
 from murmillo.agents.common.normalizer import RunningNormalizer
 from murmillo.agents.common.numbers import check_above_zero, check_at_least
+from murmillo.agents.common.ranks import Part
 from murmillo.agents.common.rollout import Rollout
 from murmillo.agents.common.training import Means, adam, adam_state, load_adam_state, load_module, minimise
 
-Minibatch = dict[str, Tensor]
-"""Rows of a rollout by name, `[B, ...]`; "state" is normalised."""
+
+class Minibatch(dict[str, Tensor]):
+    """Rows of a rollout by name, `[B, ...]`; "state" is normalised.
+
+    Attributes:
+        part: which rows of the minibatch of all ranks they are.
+    """
+
+    def __init__(self, rows: Mapping[str, Tensor], part: Part) -> None:
+        super().__init__(rows)
+        self.part = part
 
 
 @dataclass
@@ -28,6 +39,7 @@ class PPOConfig:
         hidden: sizes of the hidden layers of policy and critic.
         style_hidden: hidden sizes of the style network before the policy's condition; empty for none.
         std: the policy's standard deviation; the paper's variance is 0.0025.
+        noise_correlation: between the noise of one action and the next; the papers' noise is white.
         mean_init_scale: factor on the initial weights of the policy's last layer.
         policy_learning_rate: Adam's step for the policy.
         value_learning_rate: Adam's step for the critic.
@@ -44,6 +56,7 @@ class PPOConfig:
     hidden: tuple[int, ...] = (1024, 1024, 512)
     style_hidden: tuple[int, ...] = (512, 256)
     std: float = 0.05
+    noise_correlation: float = 0.0
     mean_init_scale: float = 1.0
     policy_learning_rate: float = 2e-5
     value_learning_rate: float = 2e-5
@@ -60,6 +73,8 @@ class PPOConfig:
         check_at_least(0, self, "agent.ppo", "policy_learning_rate", "value_learning_rate")
         check_at_least(0, self, "agent.ppo", "mean_init_scale", "bound_weight", "value_weight")
         check_above_zero(self, "agent.ppo", "std", "clip", "max_grad_norm", "target_kl")
+        if not 0 <= self.noise_correlation < 1:
+            raise AgentError(f"agent.ppo.noise_correlation={self.noise_correlation}: needs at least 0 and less than 1")
 
 
 class ActorCritic(nn.Module):
@@ -99,12 +114,10 @@ class ActorCritic(nn.Module):
         self.return_normalizer: Any = return_normalizer or RunningNormalizer()
 
     @torch.no_grad()
-    def act(
-        self, state: Tensor, told: Told, generator: torch.Generator, deterministic: bool = False
-    ) -> tuple[Tensor, Tensor]:
-        """Actions `[N, A]` and their log probabilities `[N]` for raw states `[N, D]`."""
+    def act(self, state: Tensor, told: Told = None, noise: ActionNoise | None = None) -> tuple[Tensor, Tensor]:
+        """Actions `[N, A]` and their log probabilities `[N]` for raw states `[N, D]`; the likeliest without noise."""
         parameters = self.policy(self.state_normalizer(state), told)
-        action = self.policy.mode(parameters) if deterministic else self.policy.sample(parameters, generator)
+        action = self.policy.mode(parameters) if noise is None else self.policy.sample(parameters, noise)
         return action, self.policy.log_prob(action, parameters)
 
     @torch.no_grad()
@@ -118,8 +131,8 @@ class ActorCritic(nn.Module):
 
     def observe(self, rollout: Rollout) -> None:
         """Let the normalisers learn from a rollout, once the update that used them is over."""
-        self.state_normalizer.update(rollout["state"])
-        self.return_normalizer.update(rollout["return"])
+        self.state_normalizer.update(rollout["state"], ranks=rollout.ranks)
+        self.return_normalizer.update(rollout["return"], ranks=rollout.ranks)
 
 
 class PPO:
@@ -154,6 +167,7 @@ class PPO:
         fields: tuple[str, ...] = (),
         condition: Callable[[Minibatch], Told] = lambda batch: None,
         extra_loss: Callable[[Minibatch, Tensor], Mapping[str, Tensor]] = lambda batch, mean: {},
+        other_loss: Callable[[], Mapping[str, Tensor]] = dict,
     ) -> dict[str, float]:
         """One iteration's passes over the rollout, then the normalisers.
 
@@ -164,7 +178,8 @@ class PPO:
             condition: what policy and critic are told, `[B, ...]`, from a minibatch; gradients flow into it. It may add
                 to the minibatch what `extra_loss` is to see.
             extra_loss: further weighted losses of the policy by name, from a minibatch and the policy's parameters
-                `[B, P]`, a Gaussian's means.
+                `[B, P]`, a Gaussian's means; each a mean over the minibatch.
+            other_loss: further weighted losses by name, of what is no minibatch and the same on all ranks.
 
         Returns:
             means of the losses, the KL divergence [nat], the clipped share and the entropy [nat].
@@ -173,10 +188,10 @@ class PPO:
             AgentError: the minibatch is larger than the rollout.
         """
         config = self.config
-        if config.minibatch > rollout.samples:
+        if config.minibatch > rollout.part.total:
             raise AgentError(
-                f"ppo.minibatch={config.minibatch} is larger than the {rollout.samples} samples of an iteration "
-                f"({rollout.horizon} steps of {rollout.num_envs} worlds)"
+                f"ppo.minibatch={config.minibatch} is larger than the {rollout.part.total} samples of an iteration "
+                f"({rollout.horizon} steps of {rollout.num_envs * rollout.ranks.size} worlds)"
             )
         data = {name: rollout.flat(name) for name in ("action", "log_prob", "advantage", *fields)}
         data["state"] = self.model.state_normalizer(rollout.flat("state"))
@@ -184,38 +199,47 @@ class PPO:
 
         means = Means()
         passes = [rollout.minibatches(config.minibatch, generator) for _ in range(config.epochs)]
-        for rows in chain.from_iterable(passes):
-            batch = {name: value[rows] for name, value in data.items()}
-            losses, scores = self._losses(batch, condition(batch), extra_loss)
+        for rows, part in chain.from_iterable(passes):
+            batch = Minibatch({name: value[rows] for name, value in data.items()}, part)
+            losses, scores = self._losses(batch, condition(batch), extra_loss, other_loss)
             means.add({**losses, **scores})
-            if config.target_kl is not None and scores["kl"] > config.target_kl:
+            if config.target_kl is not None and rollout.ranks.mean(scores["kl"]) > config.target_kl:
                 break
-            minimise(self.optimizer, losses, config.max_grad_norm)
+            minimise(self.optimizer, losses, config.max_grad_norm, ranks=rollout.ranks)
         self.model.observe(rollout)
-        return means.result()
+        return means.result(rollout.ranks)
 
     def _losses(
         self,
         batch: Minibatch,
         told: Told,
         extra_loss: Callable[[Minibatch, Tensor], Mapping[str, Tensor]],
+        other_loss: Callable[[], Mapping[str, Tensor]],
     ) -> tuple[dict[str, Tensor], dict[str, Tensor]]:
         config, policy = self.config, self.model.policy
         parameters = policy(batch["state"], told)
         log_prob = policy.log_prob(batch["action"], parameters)
-        losses = {
-            "policy": ppo_policy_loss(log_prob, batch["log_prob"], batch["advantage"], config.clip),
-            "bound": config.bound_weight * policy.bound_loss(parameters),
-            **extra_loss(batch, parameters),
-            "value": config.value_weight * value_loss(self.model.critic(batch["state"], told), batch["target"]),
-        }
+        weigh = batch.part.weigh
+        losses = weigh(
+            {
+                "policy": ppo_policy_loss(log_prob, batch["log_prob"], batch["advantage"], config.clip),
+                "bound": config.bound_weight * policy.bound_loss(parameters),
+                **extra_loss(batch, parameters),
+            }
+        )
+        losses |= other_loss()
+        losses |= weigh(
+            {
+                "value": config.value_weight * value_loss(self.model.critic(batch["state"], told), batch["target"]),
+            }
+        )
         with torch.no_grad():
             scores = {
                 "kl": approx_kl(log_prob, batch["log_prob"]),
                 "clipped": clip_fraction(log_prob, batch["log_prob"], config.clip),
                 "entropy": policy.entropy(parameters).mean(),
             }
-        return losses, scores
+        return losses, weigh(scores)
 
     def state_dict(self) -> dict[str, Any]:
         return {"model": self.model.state_dict(), "optimizer": adam_state(self.optimizer)}

@@ -8,6 +8,7 @@ import torch
 from torch import Tensor
 
 from murmillo.agents.common.errors import AgentError
+from murmillo.agents.common.ranks import ALONE, Part, Ranks
 
 
 class Rollout:
@@ -15,11 +16,22 @@ class Rollout:
 
     A field is allocated when it is first stored and lives on, so that an iteration writes where the last one wrote.
     "state", "skill", ... are what the agent saw, "next_state", ... their true successors (`true_next_obs`).
+
+    Attributes:
+        horizon: T.
+        num_envs: N, this rank's worlds.
+        ranks: who have as many each.
+        part: which of all ranks' samples, counted step by step and in each step rank by rank, are this one's.
     """
 
-    def __init__(self, horizon: int, num_envs: int) -> None:
+    def __init__(self, horizon: int, num_envs: int, ranks: Ranks = ALONE) -> None:
         self.horizon = horizon
         self.num_envs = num_envs
+        self.ranks = ranks
+        self.part = Part(ranks, self.samples)
+        if ranks.size > 1:
+            places = torch.arange(self.samples * ranks.size).view(horizon, -1)
+            self.part = ranks.part(places.numel(), ranks.worlds(num_envs).of(places.T).T.flatten())
         self._fields: dict[str, Tensor] = {}
 
     def store(self, t: int, fields: Mapping[str, Tensor]) -> None:
@@ -57,9 +69,13 @@ class Rollout:
         """The field as a view `[T N, ...]`."""
         return self[name].flatten(0, 1)
 
-    def minibatches(self, size: int, generator: torch.Generator) -> Iterator[Tensor]:
-        """Row indices `[<= size]` into the flat views, every row once, in random order; the last may be smaller."""
-        yield from torch.randperm(self.samples, generator=generator).split(size)
+    def minibatches(self, size: int, generator: torch.Generator) -> Iterator[tuple[Tensor, Part]]:
+        """Every row once, in random order, as `draw` gives them; the last minibatch may be smaller."""
+        yield from map(self.part.among, torch.randperm(self.part.total, generator=generator).split(size))
+
+    def draw(self, n: int, generator: torch.Generator) -> tuple[Tensor, Part]:
+        """Of n rows of all ranks, drawn with replacement, this rank's: indices into the flat views, and places."""
+        return self.part.among(torch.randint(self.part.total, (n,), generator=generator))
 
 
 def _kind(value: Tensor) -> torch.dtype:

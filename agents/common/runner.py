@@ -18,11 +18,12 @@ from murmillo.agents.common.errors import AgentError
 from murmillo.agents.common.failures import WatchConfig
 from murmillo.agents.common.interface import Agent, Directing, MultiObjective
 from murmillo.agents.common.logger import Logger
+from murmillo.agents.common.ranks import ALONE, Ranks
 from murmillo.agents.common.rollout import Rollout, tensors, true_next_obs
 from murmillo.agents.common.watch import Watch
 
 _SAVED = ("meta", "agent", "generator", "samples", "iteration", "watch")
-"""What every checkpoint of a run holds; "env", "obs" and "episodes" only where the environment has a state."""
+"""What every checkpoint of a run holds; that of its worlds only where the environment has a state."""
 
 
 @dataclass
@@ -66,6 +67,10 @@ class Runner:
 
     That holds where the environment has `state_dict` and `load_state_dict` and draws its randomness from a state in it;
     without them a resumed run begins with fresh episodes.
+
+    Ranks that share a run have a runner each, with a share of the worlds, and do everything at a time; the first one
+    writes. The checkpoint is that of one process with all the worlds, but for what the worlds are in: as many ranks as
+    there were go on exactly, another number of them with fresh episodes.
     """
 
     def __init__(
@@ -78,6 +83,7 @@ class Runner:
         *,
         meta: Mapping[str, Any] | None = None,
         logger: Logger | None = None,
+        ranks: Ranks = ALONE,
         on_iteration: Sequence[Callable[[dict[str, float]], None]] = (),
         on_warning: Sequence[Callable[[str], None]] = (),
     ) -> None:
@@ -89,7 +95,8 @@ class Runner:
             generator: the run's one source of randomness outside the environment; seeds the environment too.
             checkpoint_folder: where `save` writes.
             meta: JSON values that a checkpoint must share to be loaded: character, dimensions, skills.
-            logger: takes every iteration's statistics.
+            logger: takes every iteration's statistics; the first rank's is enough.
+            ranks: who share the run; samples, seed and statistics are those of all.
             on_iteration: called with every iteration's statistics.
             on_warning: called with one line on a known failure, when it has lasted; `watch.notices` keeps them.
 
@@ -106,12 +113,13 @@ class Runner:
         self.checkpoint_folder = Path(checkpoint_folder)
         self.meta = dict(meta or {})
         self.logger = logger
+        self.ranks = ranks
         self.on_iteration = on_iteration
         self.on_warning = on_warning
         self.watch = Watch(config.watch)
         self.samples = 0
         self.iteration = 0
-        self._rollout = Rollout(config.horizon, env.num_envs)
+        self._rollout = Rollout(config.horizon, env.num_envs, ranks)
         self._episodes = EpisodeStatistics(env.num_envs)
         self._obs: dict[str, Tensor] | None = None
         self._extras: tuple[str, ...] = ()
@@ -130,7 +138,7 @@ class Runner:
             scalars = self.agent.update(rollout)
             self._check(scalars)
             self._log(rewards | scalars, time.monotonic() - started)
-            if time.monotonic() - saved > 60 * self.config.checkpoint_minutes:
+            if self.ranks.any(time.monotonic() - saved > 60 * self.config.checkpoint_minutes):
                 self.save()
                 saved = time.monotonic()
         self.save()
@@ -142,7 +150,7 @@ class Runner:
     def _finished(self, begun: float) -> bool:
         minutes = (time.monotonic() - begun) / 60
         limit = math.inf if self.config.max_minutes is None else self.config.max_minutes
-        return self._stopping or self.samples >= self.config.samples or minutes >= limit
+        return self.ranks.any(self._stopping or self.samples >= self.config.samples or minutes >= limit)
 
     def _direct(self) -> None:
         """Tell the environment what the agent wants of the next episodes."""
@@ -169,7 +177,7 @@ class Runner:
             rollout.store(t, {**successor, **ends, "task": torch.as_tensor(reward), **side})
             done = ends["terminated"] | ends["truncated"]
             self._episodes.step(ends["terminated"], done)
-            if done.any():
+            if done.any() or self.ranks.size > 1:
                 self.agent.reset(done.nonzero().flatten())
             obs = tensors(next_obs)
             self._extras, self._env_terms = tuple(step.extras), ("task", *side)
@@ -178,7 +186,7 @@ class Runner:
 
     def _first_obs(self) -> dict[str, Tensor]:
         seed = int(torch.randint(2**31, (), generator=self.generator))
-        obs, _ = self.env.reset(seed=seed)
+        obs, _ = self.env.reset(seed=seed + self.ranks.rank)
         self.agent.reset(torch.arange(self.env.num_envs))
         return tensors(obs)
 
@@ -199,7 +207,7 @@ class Runner:
             reward = reward.masked_fill(terminated, self.config.termination_reward)
         rollout["reward"] = reward
         means = {f"reward/{name}": term.mean().item() for name, term in terms.items()}
-        return means | {"reward/total": total.mean().item()}
+        return self.ranks.mean_scalars(means | {"reward/total": total.mean().item()})
 
     def _by_objective(self, terms: Mapping[str, Tensor], weights: Mapping[str, float]) -> Tensor:
         """The terms that have a critic, `[T, N, C]`."""
@@ -225,9 +233,9 @@ class Runner:
         rollout["return"] = advantage + value
         if isinstance(self.agent, MultiObjective):
             weights = [self.config.reward_weights.get(name, 0.0) for name in self.agent.objectives]
-            rollout["advantage"] = weigh_advantages(advantage, weights)
+            rollout["advantage"] = weigh_advantages(advantage, weights, ranks=self.ranks)
         else:
-            rollout["advantage"] = normalise_advantage(advantage)
+            rollout["advantage"] = normalise_advantage(advantage, ranks=self.ranks)
 
     def _check(self, scalars: Mapping[str, float]) -> None:
         for name, value in scalars.items():
@@ -239,13 +247,13 @@ class Runner:
                 )
 
     def _log(self, scalars: dict[str, float], seconds: float) -> None:
-        self.samples += self._rollout.samples
+        self.samples += self._rollout.part.total
         self.iteration += 1
         stats = {
             "samples": float(self.samples),
             "iteration": float(self.iteration),
-            "samples_per_second": self._rollout.samples / seconds,
-            **self._episodes.summary(),
+            "samples_per_second": self._rollout.part.total / seconds,
+            **self._episodes.summary(self.ranks),
             **scalars,
         }
         if self.logger is not None:
@@ -257,7 +265,7 @@ class Runner:
                 callback(warning)
 
     def save(self) -> None:
-        """Write all that the next iteration depends on to the checkpoint folder."""
+        """Write all that the next iteration depends on to the checkpoint folder; all ranks must call it."""
         state: dict[str, Any] = {
             "meta": self.meta,
             "agent": self.agent.state_dict(),
@@ -267,11 +275,16 @@ class Runner:
             "watch": self.watch.state_dict(),
         }
         if self._obs is not None and hasattr(self.env, "state_dict"):
-            state |= {"env": self.env.state_dict(), "obs": self._obs, "episodes": self._episodes.state_dict()}  # type: ignore
-        checkpoint.save(self.checkpoint_folder, state)
+            worlds = {"env": self.env.state_dict(), "obs": self._obs, "episodes": self._episodes.state_dict()}  # type: ignore
+            if self.ranks.size == 1:
+                state |= worlds
+            else:
+                state["worlds"] = {str(rank): part for rank, part in enumerate(self.ranks.collect(worlds))}
+        if self.ranks.first:
+            checkpoint.save(self.checkpoint_folder, state)
 
     def load(self, folder: Path | str) -> None:
-        """Go on from a checkpoint, in a fresh runner of the same config.
+        """Go on from a checkpoint, in a fresh runner of the same config; every rank reads it whole.
 
         Raises:
             AgentError: it is damaged, incomplete, or its `meta` is another's.
@@ -285,9 +298,11 @@ class Runner:
         self.samples, self.iteration = state["samples"], state["iteration"]
         self.generator.set_state(state["generator"])
         self.watch.load_state_dict(state["watch"])
-        if "env" in state:
-            self.env.load_state_dict(state["env"])  # type: ignore
-            self._episodes.load_state_dict(state["episodes"])
-            self._obs = state["obs"]
+        parts = {"0": state} if "env" in state else state.get("worlds", {})
+        if len(parts) == self.ranks.size:
+            worlds = parts[str(self.ranks.rank)]
+            self.env.load_state_dict(worlds["env"])  # type: ignore
+            self._episodes.load_state_dict(worlds["episodes"])
+            self._obs = worlds["obs"]
         if self.logger is not None:
             self.logger.resume(self.samples)

@@ -12,9 +12,11 @@ from torch.nn import functional as F
 
 from murmillo.agents.common.dimensions import action_size, skill_count
 from murmillo.agents.common.errors import AgentError
+from murmillo.agents.common.exploration import ActionNoise
 from murmillo.agents.common.interface import Obs, Step
 from murmillo.agents.common.networks import GaussianPolicy
 from murmillo.agents.common.ppo import PPO, ActorCritic, Minibatch, PPOConfig
+from murmillo.agents.common.ranks import ALONE, Ranks
 from murmillo.agents.common.rollout import Rollout
 from murmillo.agents.common.training import load_parts, named, state_of
 
@@ -54,6 +56,8 @@ class TaskAgent:
         config: TaskAgentConfig,
         generator: torch.Generator,
         make_policy: MakePolicy | None = None,
+        *,
+        ranks: Ranks = ALONE,
     ) -> None:
         """
         Args:
@@ -61,12 +65,14 @@ class TaskAgent:
             config: hyperparameters.
             generator: draws weights, noise and minibatches.
             make_policy: for actions that are not Gaussian.
+            ranks: who train it together.
 
         Raises:
             AgentError: the environment has no "state", no "skill" where it is asked for, or actions that are no vector.
         """
         self.config = config
         self.generator = generator
+        self.ranks = ranks
         observed, action_dim = _observed(env), action_size(env)
         self._inputs = [name for name in ("state", "goal") if name in observed]
         self._told = ("skill",) if config.skill else ()
@@ -76,11 +82,12 @@ class TaskAgent:
         policy = make_policy(width, action_dim, self._skills) if make_policy else None
         self.model = ActorCritic(width, action_dim, self._skills, config.ppo, generator, policy)
         self.ppo = PPO(self.model, config.ppo)
-        self._parts = {"ppo": self.ppo}
+        self.noise = ActionNoise(generator, config.ppo.noise_correlation, ranks)
+        self._parts = {"ppo": self.ppo, "noise": self.noise}
 
     def act(self, obs: Obs, *, deterministic: bool = False) -> Step:
-        action, log_prob = self.model.act(self._input(obs), self._condition(obs), self.generator, deterministic)
-        return Step(action, log_prob)
+        told = self._condition(obs)
+        return Step(*self.model.act(self._input(obs), told, None if deterministic else self.noise))
 
     def value(self, obs: Obs, extras: dict[str, Tensor]) -> Tensor:
         return self.model.value(self._input(obs), self._condition(obs))
@@ -94,7 +101,7 @@ class TaskAgent:
 
     def update(self, rollout: Rollout) -> dict[str, float]:
         """One iteration of PPO."""
-        seen = Rollout(*rollout.shape)
+        seen = Rollout(*rollout.shape, rollout.ranks)
         for name in ("action", "log_prob", "advantage", "return", *self._told):
             seen[name] = rollout[name]
         seen["state"] = self._input({name: rollout[name] for name in self._inputs})

@@ -7,6 +7,7 @@ import torch
 from torch import Tensor, nn
 
 from murmillo.agents.common.errors import AgentError
+from murmillo.agents.common.ranks import ALONE, Ranks
 
 
 def adam(*groups: tuple[Iterable[nn.Parameter], float]) -> torch.optim.Adam:
@@ -15,13 +16,22 @@ def adam(*groups: tuple[Iterable[nn.Parameter], float]) -> torch.optim.Adam:
 
 
 def minimise(
-    optimizer: torch.optim.Optimizer, losses: Mapping[str, Tensor], max_grad_norm: float | None = None
+    optimizer: torch.optim.Optimizer,
+    losses: Mapping[str, Tensor],
+    max_grad_norm: float | None = None,
+    *,
+    ranks: Ranks = ALONE,
 ) -> None:
-    """One step down the sum of named losses; the gradient of all parameters together is scaled down to the norm."""
+    """One step down the sum of named losses, and its mean over the ranks.
+
+    The gradient of all parameters together is scaled down to the norm.
+    """
     optimizer.zero_grad()
     torch.stack(list(losses.values())).sum().backward()
+    parameters = [p for group in optimizer.param_groups for p in group["params"]]
+    ranks.average_gradients(parameters)
     if max_grad_norm is not None:
-        nn.utils.clip_grad_norm_([p for group in optimizer.param_groups for p in group["params"]], max_grad_norm)
+        nn.utils.clip_grad_norm_(parameters, max_grad_norm)
     optimizer.step()
 
 
@@ -73,7 +83,7 @@ def load_parts(parts: Mapping[str, Any], state: Mapping[str, Any]) -> None:
 
 
 class Means:
-    """Collects named scalars; `result` gives the mean of each."""
+    """Collects named scalars; `result` gives the mean of each, over the ranks too."""
 
     def __init__(self) -> None:
         self._values: dict[str, list[Tensor]] = {}
@@ -82,8 +92,8 @@ class Means:
         for name, value in scalars.items():
             self._values.setdefault(name, []).append(value.detach())
 
-    def result(self) -> dict[str, float]:
-        return {name: torch.stack(values).mean().item() for name, values in self._values.items()}
+    def result(self, ranks: Ranks = ALONE) -> dict[str, float]:
+        return ranks.mean_scalars({name: torch.stack(values).mean().item() for name, values in self._values.items()})
 
 
 def named(group: str, scalars: Mapping[str, float]) -> dict[str, float]:

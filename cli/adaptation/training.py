@@ -10,10 +10,11 @@ from murmillo.agents.adaptnet.networks import LENGTH
 from murmillo.agents.common import checkpoint
 from murmillo.agents.common.interface import Obs
 from murmillo.agents.common.logger import Logger
+from murmillo.agents.common.ranks import ALONE, Ranks
 from murmillo.agents.common.rollout import tensors
 from murmillo.agents.common.runner import Runner
 from murmillo.agents.common.warm_start import warm_start
-from murmillo.cli import foundations, runs, versions
+from murmillo.cli import foundations, launch, runs
 from murmillo.cli.adaptation import report
 from murmillo.cli.adaptation.base import SETTING, BaseRun
 from murmillo.cli.adaptation.checks import check_settings
@@ -23,32 +24,34 @@ from murmillo.cli.adaptation.metrics import TRAINING
 from murmillo.cli.adaptation.world import agent_meta, check_base, make_agent, make_env
 from murmillo.cli.progress import Progress
 from murmillo.cli.tasks.training import complete, note_clips
-from murmillo.cli.training import describe, follow, undone_by_mistakes
+from murmillo.cli.training import follow, kept
 from murmillo.envs import HumanoidVectorEnv
 
 
-def train(config: AdaptNetTrainConfig, suffix: str = "") -> int:
+def train(config: AdaptNetTrainConfig, suffix: str = "", ranks: Ranks = ALONE) -> int:
     """Train as the settings say; 0 also where a signal ended it early. `suffix` is put behind a default name.
+
+    Ranks that share the run all call this; the first one writes, and measures in the end.
 
     Raises:
         CommandError, SuiteError, AgentError: a mistake in the settings; a new run's folder is then not left behind.
     """
     base = config.find_base()
-    check_settings(config, base)
-    resuming = config.run.resume is not None
+
+    def check() -> AdaptNetTrainConfig:
+        check_settings(config, base)
+        return config
+
+    launch.agreed(ranks, check)
     name = config.run.name or runs.default_name(_named(config), config.choices["budget"], config.seed, suffix)
-    folder = Path(config.run.resume) if config.run.resume else runs.vacant(config.run.root, name)
-    config.run.name = name
+    folder, resuming = launch.open_run(config, name, ranks)
     if resuming:
         check_base(base, checkpoint.load(folder / runs.LAST))
-    torch.set_num_threads(config.threads or versions.usable_cores())
-    env = make_env(config, config.num_envs)
+    threads = launch.share_threads(config).threads
+    env = make_env(config, config.num_envs // ranks.size, threads=threads)
     try:
-        if not resuming:
-            runs.make(folder)
-        with undone_by_mistakes(folder, resuming):
-            describe(folder, config)
-            return _train(config, base, env, folder, resuming)
+        with kept(folder, config, resuming, ranks):
+            return _train(config, base, env, folder, resuming, ranks)
     finally:
         env.close()
 
@@ -62,27 +65,36 @@ def _named(config: AdaptNetTrainConfig) -> str:
 
 
 def _train(
-    config: AdaptNetTrainConfig, base: BaseRun | None, env: HumanoidVectorEnv, folder: Path, resuming: bool
+    config: AdaptNetTrainConfig,
+    base: BaseRun | None,
+    env: HumanoidVectorEnv,
+    folder: Path,
+    resuming: bool,
+    ranks: Ranks,
 ) -> int:
-    agent, generator = make_agent(config, base, env)
-    meta = agent_meta(config, env)
-    runner = Runner(env, agent, config.runner, generator, folder / runs.LAST, meta=meta, logger=Logger(folder))
+    agent, generator = make_agent(config, base, env, ranks)
+    meta, logger = agent_meta(config, env), Logger(folder) if ranks.first else None
+    to = folder / runs.LAST
+    runner = Runner(env, agent, config.runner, generator, to, meta=meta, logger=logger, ranks=ranks)
     if resuming:
         runner.load(folder / runs.LAST)
     # after loading: they are kept with a checkpoint, and need not be those here
     runner.meta |= foundations.identity(SETTING, base and base.folder)
-    note_clips(folder, runner, env)
+    note_clips(folder, runner, env, ranks)
     what = "a base" if base is None else f"{base.word} to {config.choices['to']} by {config.choices['method']}"
 
     def begin(progress: Progress) -> None:
         if not resuming and config.warm_start.steps:
             _warm_start(config, agent, env, generator, progress)
+            ranks.copy_first(agent.model)
 
     def measured() -> dict[str, Any]:
         return evaluate(config, base, folder, config.run.measured_worlds)
 
-    opening = f"{folder}: {what}, {config.num_envs} worlds"
+    opening = f"{folder}: {what}, {launch.worlds(config, ranks)}"
     stopped = follow(runner, folder, opening, metrics=TRAINING, begin=begin)
+    if not ranks.first:
+        return 0
     return complete(folder, runner.samples if stopped else None, measured, report.write, video=config.run.video)
 
 

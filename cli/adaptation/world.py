@@ -8,6 +8,7 @@ import torch
 
 from murmillo.agents.adaptnet.agent import AdaptNet
 from murmillo.agents.common import checkpoint
+from murmillo.agents.common.ranks import ALONE, Ranks
 from murmillo.cli import foundations, runs
 from murmillo.cli.adaptation.base import SETTING, BaseRun
 from murmillo.cli.adaptation.config import SCRATCH, AdaptNetTrainConfig, load
@@ -23,7 +24,7 @@ def make_env(
 
 
 def make_agent(
-    config: AdaptNetTrainConfig, base: BaseRun | None, env: HumanoidVectorEnv
+    config: AdaptNetTrainConfig, base: BaseRun | None, env: HumanoidVectorEnv, ranks: Ranks = ALONE
 ) -> tuple[AdaptNet, torch.Generator]:
     """The agent as it is before training, and the generator that it draws from: equal for equal arguments.
 
@@ -32,7 +33,7 @@ def make_agent(
     """
     generator = torch.Generator().manual_seed(config.seed)
     weights = None if base is None or config.choices["method"] == SCRATCH else base.weights(env.character)
-    return AdaptNet(env, env.demonstrations, config.agent, generator, weights), generator
+    return AdaptNet(env, env.demonstrations, config.agent, generator, weights, ranks=ranks), generator
 
 
 def load_agent(config: AdaptNetTrainConfig, base: BaseRun | None, env: HumanoidVectorEnv, folder: Path) -> AdaptNet:

@@ -34,6 +34,8 @@ class Keeper:
         samples = self._runner.samples
         agent = {name: part for name, part in self._agent.state_dict().items() if name not in _TRAINING_ALONE}
         state = {"meta": self._runner.meta, "agent": agent, "samples": samples}
+        if not self._runner.ranks.first:
+            return
         checkpoint.save(self._folder / runs.CHECKPOINTS / str(samples), state)
 
 

@@ -12,6 +12,7 @@ from torch import Tensor
 from murmillo.agents.case.high_level import HybridDecoder, hybrid_agent
 from murmillo.agents.common import checkpoint
 from murmillo.agents.common.latent_env import LatentEnv, Results
+from murmillo.agents.common.ranks import ALONE, Ranks
 from murmillo.agents.common.task_agent import TaskAgent
 from murmillo.cli.tasks.config import TaskTrainConfig
 from murmillo.cli.tasks.low import LowRun
@@ -92,12 +93,12 @@ class World:
         self.env.close()
 
 
-def make_policy(config: TaskTrainConfig, world: World) -> tuple[TaskAgent, torch.Generator]:
+def make_policy(config: TaskTrainConfig, world: World, ranks: Ranks = ALONE) -> tuple[TaskAgent, torch.Generator]:
     """The policy as it is before training, and the generator that it draws from: equal for equal arguments."""
     generator = torch.Generator().manual_seed(config.seed)
     if world.hybrid:
-        return hybrid_agent(world.decisions, config.agent, generator), generator
-    return TaskAgent(world.decisions, config.agent, generator), generator
+        return hybrid_agent(world.decisions, config.agent, generator, ranks=ranks), generator
+    return TaskAgent(world.decisions, config.agent, generator, ranks=ranks), generator
 
 
 def load_policy(config: TaskTrainConfig, world: World, folder: Path) -> TaskAgent:

@@ -15,12 +15,18 @@ class Demonstrations:
         self._library, self._character, self._window, self._action_dim = library, character, window, action_dim
 
     def __call__(
-        self, n: int, generator: torch.Generator, skill: Tensor | None = None, frames: int | None = None
+        self,
+        n: int,
+        generator: torch.Generator,
+        skill: Tensor | None = None,
+        frames: int | None = None,
+        rows: Tensor | slice | None = None,
     ) -> dict[str, Tensor]:
         """Windows of the clips, made by the function that makes the observations.
 
         They end at any time of a clip, and repeat its first frame where they begin before it. If their length is asked
         for with `frames`, they lie within their clips as far as those are long enough, and end at one of their frames.
+        Of the n that are drawn only `rows` are made, if they are given: the dear part is to make them.
 
         Returns:
             window: [n, W, D], 120 wide or as `Features.window` has it; skill: [n] their labels, of the skills [n] asked
@@ -30,6 +36,8 @@ class Demonstrations:
         library = self._library
         span = 0.0 if frames is None else (frames - 1) * library.character.control_dt
         clip, time = library.sample(n, generator, skill, span, on_frames=frames is not None)
+        if rows is not None:
+            clip, time = clip[rows], time[rows]
         drawn = {"window": library.window(clip, time, frames or self._window), "skill": library.clip_skill[clip]}
         return drawn if library.mask is None else drawn | {"mask": library.mask[clip]}
 

@@ -8,6 +8,7 @@ from murmillo.agents.adaptnet.ensemble import Ensemble, EnsembleConfig, hinge_lo
 from murmillo.agents.adaptnet.networks import HeightMapEncoder, HistoryCritic, HistoryEncoder, RecurrentPolicy
 from murmillo.agents.common.discriminator import Windows
 from murmillo.agents.common.errors import AgentError
+from murmillo.agents.common.exploration import ActionNoise
 from murmillo.agents.common.popart import PopArt
 from murmillo.agents.common.recurrent import LastOutput
 
@@ -38,7 +39,7 @@ def test_the_standard_deviation_begins_as_configured_and_depends_on_the_state(ge
         policy.spread.weight *= 1e4
     mean, log_std = policy.moments(parameters := policy(state, told))
     assert log_std.std(0).min() > 0.01
-    action = policy.sample(parameters, generator)
+    action = policy.sample(parameters, ActionNoise(generator))
     by_torch = torch.distributions.Normal(mean, log_std.exp())
     torch.testing.assert_close(policy.log_prob(action, parameters), by_torch.log_prob(action).sum(-1))
     torch.testing.assert_close(policy.entropy(parameters), by_torch.entropy().sum(-1))

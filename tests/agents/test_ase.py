@@ -6,7 +6,8 @@ import torch
 
 from murmillo.agents.common.errors import AgentError
 from murmillo.agents.common.latents import sample_sphere
-from murmillo.agents.common.ppo import PPOConfig
+from murmillo.agents.common.ppo import Minibatch, PPOConfig
+from murmillo.agents.common.ranks import ALONE, Part
 from murmillo.agents.common.warm_start import WarmStartConfig, warm_start
 from tests.agents.toy import PointMass, make_ase, make_case, make_runner, small_ase
 
@@ -58,7 +59,8 @@ def test_diversity_is_asked_of_two_different_latents(make: Callable, generator: 
     agent = make(PointMass(3), generator, diversity_weight=1.0)
     with torch.no_grad():
         agent.model.policy.head.weight *= 30
-    batch = {"state": torch.randn(64, 4, generator=generator), "label": torch.zeros(64, dtype=torch.int64)}
+    rows = {"state": torch.randn(64, 4, generator=generator), "label": torch.zeros(64, dtype=torch.int64)}
+    batch = Minibatch(rows, Part(ALONE, 64))
     batch["latent"] = sample_sphere(64, 4, generator)
     condition = batch["latent"] if make is make_ase else agent.condition(batch["latent"], batch["label"])
     mean = agent.model.policy(batch["state"], condition)

@@ -12,6 +12,7 @@ from torch import Tensor
 from murmillo.agents.case.high_level import HybridConfig, HybridDecoder, HybridPolicy
 from murmillo.agents.common import checkpoint
 from murmillo.agents.common.errors import AgentError
+from murmillo.agents.common.exploration import ActionNoise
 from murmillo.agents.common.latent_env import LatentEnv
 from murmillo.agents.common.ppo import PPOConfig
 from murmillo.agents.common.rollout import tensors
@@ -50,7 +51,7 @@ def test_the_relaxed_labels_density_is_that_of_the_concrete_distribution(generat
     """(K - 1)! tau^(K-1) prod_k (pi_k x_k^-tau) / (sum_k pi_k x_k^-tau)^K for y = log x (Maddison et al., eq. 22)."""
     tau = 0.7
     relaxed = policy(gumbel=tau)
-    action = relaxed.sample(parameters(50), generator)
+    action = relaxed.sample(parameters(50), ActionNoise(generator))
     scores, z = action.tensor_split([3], -1)
     torch.testing.assert_close(scores.exp().sum(-1), torch.ones(50))
     weight = torch.tensor([1.0, 2, 5]) * torch.exp(-tau * scores)
@@ -62,7 +63,7 @@ def test_the_relaxed_labels_density_is_that_of_the_concrete_distribution(generat
 
 @pytest.mark.parametrize("gumbel", [None, 0.3, 2.0])
 def test_labels_come_as_often_as_their_probabilities_say(gumbel: float | None, generator: torch.Generator) -> None:
-    action = policy(gumbel).sample(parameters(40_000), generator)
+    action = policy(gumbel).sample(parameters(40_000), ActionNoise(generator))
     label = HybridDecoder(3, 2)(action).observed["skill"]
     shares = label.bincount(minlength=3) / 40_000
     torch.testing.assert_close(shares, torch.tensor([1 / 8, 2 / 8, 5 / 8]), atol=0.01, rtol=0)
@@ -93,7 +94,7 @@ def test_at_first_all_labels_are_alike_and_latents_are_around_the_origin() -> No
 def test_gradients_reach_both_heads(gumbel: float | None, generator: torch.Generator) -> None:
     one = policy(gumbel)
     out = one(torch.randn(6, 4, generator=generator))
-    one.log_prob(one.sample(out.detach(), generator), out).sum().backward()
+    one.log_prob(one.sample(out.detach(), ActionNoise(generator)), out).sum().backward()
     assert one.label_head.weight.grad is not None
     assert one.head.weight.grad is not None
     assert one.label_head.weight.grad.any()

@@ -3,6 +3,7 @@ from typing import Any
 import torch
 
 from murmillo.agents.common.advantages import normalise_advantage
+from murmillo.agents.common.exploration import ActionNoise
 from murmillo.agents.common.losses import action_bound_loss
 from murmillo.agents.common.ppo import PPO, ActorCritic, PPOConfig
 from murmillo.agents.common.rollout import Rollout
@@ -19,7 +20,7 @@ def rollout(ppo: PPO, generator: torch.Generator) -> Rollout:
     batch = Rollout(5, 10)
     for t in range(5):
         state = 7 + torch.randn(10, 3, generator=generator)
-        action, log_prob = ppo.model.act(state, None, generator)
+        action, log_prob = ppo.model.act(state, None, ActionNoise(generator))
         batch.store(t, {"state": state, "action": action, "log_prob": log_prob})
     batch["advantage"] = normalise_advantage(batch["action"][..., 0])
     batch["return"] = 100 + 10 * batch["state"][..., 1]
@@ -28,7 +29,7 @@ def rollout(ppo: PPO, generator: torch.Generator) -> Rollout:
 
 def mean_action(ppo: PPO) -> torch.Tensor:
     state = torch.full((1, 3), 7.0)
-    return ppo.model.act(state, None, torch.Generator(), deterministic=True)[0][0]
+    return ppo.model.act(state)[0][0]
 
 
 def test_it_moves_towards_what_was_better_and_learns_the_return(generator: torch.Generator) -> None:
@@ -84,7 +85,7 @@ def test_a_further_loss_and_a_condition_reach_the_networks(generator: torch.Gene
     batch = Rollout(5, 10)
     for t in range(5):
         state, label = torch.randn(10, 3, generator=generator), torch.randn(10, 4, generator=generator)
-        action, log_prob = ppo.model.act(state, label, generator)
+        action, log_prob = ppo.model.act(state, label, ActionNoise(generator))
         batch.store(t, {"state": state, "label": label, "action": action, "log_prob": log_prob})
     batch["advantage"] = batch["return"] = torch.randn(5, 10, generator=generator)
     stats = ppo.update(

@@ -11,7 +11,7 @@ def rows(start: int, stop: int) -> dict[str, torch.Tensor]:
 
 
 def contents(replay: Replay, generator: torch.Generator) -> set[int]:
-    return set(replay.sample(5000, generator)["number"].tolist())
+    return set(replay.sample(5000, generator)[0]["number"].tolist())
 
 
 def test_it_fills_up_first_and_then_admits_few(generator: torch.Generator) -> None:
@@ -36,7 +36,7 @@ def test_fields_stay_together(generator: torch.Generator) -> None:
     replay = Replay(50, keep=0.5)
     for start in range(0, 200, 20):
         replay.add(rows(start, start + 20), generator)
-    sample = replay.sample(64, generator)
+    sample, _ = replay.sample(64, generator)
     assert torch.equal(sample["window"][:, 1, 2].long(), sample["number"])
 
 
@@ -50,7 +50,7 @@ def test_state_continues_exactly(generator: torch.Generator) -> None:
     for memory in (replay, other):
         generator.set_state(state)
         memory.add(rows(20, 40), generator)
-        samples.append(memory.sample(100, generator)["number"])
+        samples.append(memory.sample(100, generator)[0]["number"])
     assert torch.equal(*samples)
 
 

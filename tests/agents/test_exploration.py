@@ -1,0 +1,51 @@
+"""The noise of actions: white or lasting, always standard normal, and gone on with where it was."""
+
+import pytest
+import torch
+
+from murmillo.agents.common.exploration import ActionNoise
+
+STEPS, WORLDS, DIM = 400, 200, 3
+
+
+def drawn(correlation: float, steps: int = STEPS) -> torch.Tensor:
+    noise = ActionNoise(torch.Generator().manual_seed(0), correlation)
+    return torch.stack([noise.step(WORLDS, DIM) for _ in range(steps)])
+
+
+@pytest.mark.parametrize("correlation", [0.0, 0.5, 0.9])
+def test_it_is_standard_normal_at_every_step_and_correlated_as_asked(correlation: float) -> None:
+    noise = drawn(correlation)
+    assert noise.mean().abs() < 0.05
+    # over the worlds of single steps too: the first is not smaller than the last
+    torch.testing.assert_close(noise[[0, 1, 5, -1]].flatten(1).std(1), torch.ones(4), atol=0.1, rtol=0)
+    for lag in (1, 2, 5):
+        measured = (noise[lag:] * noise[:-lag]).mean()
+        torch.testing.assert_close(measured, torch.tensor(correlation**lag), atol=0.02, rtol=0)
+
+
+def test_white_noise_is_what_the_generator_gives() -> None:
+    generator = torch.Generator().manual_seed(0)
+    assert torch.equal(drawn(0.0, 5), torch.stack([torch.randn(WORLDS, DIM, generator=generator) for _ in range(5)]))
+
+
+def test_worlds_and_axes_do_not_share_it() -> None:
+    noise = drawn(0.9).permute(1, 2, 0).reshape(WORLDS * DIM, STEPS)
+    among = torch.corrcoef(noise) - torch.eye(WORLDS * DIM)
+    assert among.mean().abs() < 0.01
+
+
+@pytest.mark.parametrize("correlation", [0.0, 0.9])
+def test_it_goes_on_where_it_was(correlation: float) -> None:
+    at_once = drawn(correlation, 6)
+    generator = torch.Generator().manual_seed(0)
+    first = ActionNoise(generator, correlation)
+    for _ in range(3):
+        first.step(WORLDS, DIM)
+    kept, state = first.state_dict(), generator.get_state()
+    first.step(WORLDS, DIM)  # what is kept is not what goes on
+    generator.set_state(state)
+    again = ActionNoise(generator, correlation)
+    again.load_state_dict(kept)
+    for step in (3, 4, 5):
+        assert torch.equal(again.step(WORLDS, DIM), at_once[step])
