@@ -44,7 +44,7 @@ def make_agent(
     name: str, config: Any, env: HumanoidVectorEnv, seed: int, ranks: Ranks = ALONE
 ) -> tuple[Any, torch.Generator]:
     """The agent as it is before training, and the generator that it draws from: equal for equal arguments."""
-    generator = torch.Generator().manual_seed(seed)
+    generator = torch.Generator(env.device).manual_seed(seed)
     return AGENTS[name].make(env, env.demonstrations, config, generator, ranks=ranks), generator
 
 

@@ -7,6 +7,7 @@ from typing import Any
 from murmillo.cli import runs, tables
 from murmillo.cli.agents import load_player, make_agent
 from murmillo.cli.config import TrainConfig
+from murmillo.cli.devices import for_playing
 from murmillo.cli.encodings import concentration
 from murmillo.cli.rollouts import AGES, measure
 from murmillo.envs import HumanoidVectorEnv
@@ -22,7 +23,7 @@ def measure_ages(config: TrainConfig, folder: Path, worlds: int, seed: int = 123
     """
     # only the first episodes count, which start in a clip: what comes after them need not be costly
     starts = dataclasses.replace(config.env.starts, fallen=0.0)
-    env = HumanoidVectorEnv(worlds, dataclasses.replace(config.env, autoreset="same_step", starts=starts))
+    env = HumanoidVectorEnv(worlds, dataclasses.replace(for_playing(config.env), autoreset="same_step", starts=starts))
     try:
         made_of = (config.choices["agent"], config.agent, env, config.seed)
         judge = load_player(*made_of, folder / runs.LAST)

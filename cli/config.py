@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import Any, Literal, TypeVar, cast
 
 from hydra import compose, initialize_config_module
 from hydra.core.config_store import ConfigStore
@@ -24,7 +24,7 @@ from murmillo.cli.translate import command_error, unreadable, wrong_name
 from murmillo.envs import EnvConfig
 
 GROUPS = ("agent", "budget", "ablation")
-RESUMABLE = ("run.", "runner.", "threads=")
+RESUMABLE = ("run.", "runner.", "threads=", "matmul=")
 """What may be set anew when a run is taken up again; everything else is the run's own."""
 
 T = TypeVar("T")
@@ -65,6 +65,9 @@ class TrainConfig:
         skills: how many labels the clips must have; None takes what they have.
         num_envs: worlds that are simulated together.
         seed: of everything random.
+        physics: what simulates, "cpu" or "warp" (docs/gpu.md).
+        device: where it learns: "auto" is the CPU, of "warp" the first GPU; "cuda:1" and the like, or "cpu".
+        matmul: how exact float32 products of matrices are on a GPU that has TF32.
         threads: CPU threads; 0 takes every core that the process may use.
     """
 
@@ -79,6 +82,9 @@ class TrainConfig:
     skills: int | None = None
     num_envs: int = 4096
     seed: int = 1
+    physics: Literal["cpu", "warp"] = "cpu"
+    device: str = "auto"
+    matmul: Literal["highest", "tf32"] = "highest"
     threads: int = 0
 
 

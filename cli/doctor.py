@@ -46,10 +46,23 @@ def findings() -> Iterator[tuple[str, str, bool | None]]:
         yield f"OpenGL {backend}", reason or "draws a frame without a screen", reason is None
     gpu = versions.gpu()
     yield "GPU", gpu or "none that torch can use; training runs on the processor", None
+    yield "physics=warp", *warp()
     try:
         yield "environment", f"{environment_speed():,.0f} control steps/s over {WORLDS} worlds", True
     except Exception as error:  # the doctor reports whatever goes wrong
         yield "environment", f"{type(error).__name__}: {error}", False
+
+
+def warp() -> tuple[str, bool]:
+    """Whether MuJoCo Warp is there and has a GPU."""
+    try:
+        import mujoco_warp  # noqa: F401 it is to import
+        import warp
+    except ImportError as error:
+        return f"{error}; install it with pip install 'murmillo[gpu]'", False
+    warp.config.log_level = warp.LOG_ERROR
+    gpus = [f"{gpu.alias} {gpu.name}" for gpu in warp.get_cuda_devices()]
+    return ", ".join(gpus) or "installed, but without a GPU: device=cpu is for tests", bool(gpus)
 
 
 def environment_speed() -> float:

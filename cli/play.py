@@ -96,12 +96,13 @@ def _open_agent(folder: Path, settings: PlayConfig) -> "Session":
     from murmillo.cli import config as configuration
     from murmillo.cli import runs
     from murmillo.cli.agents import load_player
+    from murmillo.cli.devices import for_playing
     from murmillo.envs import HumanoidVectorEnv
     from murmillo.viewer.pilots import AgentPilot
     from murmillo.viewer.session import Session, playable
 
     config = configuration.load(folder)
-    shown = dataclasses.replace(config.env, motions=settings.motions or config.env.motions)
+    shown = dataclasses.replace(for_playing(config.env), motions=settings.motions or config.env.motions)
     env = HumanoidVectorEnv(1, playable(shown))
     player = load_player(config.choices["agent"], config.agent, env, config.seed, folder / runs.LAST)
     return Session(env, AgentPilot(player), shown.fall, settings.seed)

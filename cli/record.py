@@ -142,10 +142,13 @@ def film(config: Any, folder: Path, settings: RecordConfig, out: Path) -> Path:
     from murmillo.agents.common.rollout import tensors
     from murmillo.cli import runs
     from murmillo.cli.agents import load_player
+    from murmillo.cli.devices import for_playing
     from murmillo.envs import HumanoidVectorEnv
 
     motions = settings.motions or config.env.motions
-    shown = dataclasses.replace(config.env, camera=settings.camera, motions=motions, autoreset="same_step", threads=1)
+    shown = dataclasses.replace(
+        for_playing(config.env), camera=settings.camera, motions=motions, autoreset="same_step", threads=1
+    )
     env = HumanoidVectorEnv(1, shown, render_mode="rgb_array")
     beside = out.with_name(f".{out.stem}.part.mp4")
     try:

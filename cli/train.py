@@ -32,6 +32,8 @@ Settings are written name=value. The first ones:
   ablation   none, no_skill_discovery, no_diversity, neither, no_focal, no_masking, residual
   seed       1                                       of everything random
   num_envs   512                                     worlds that are simulated together
+  physics    cpu or warp                             warp simulates on a GPU (docs/gpu.md)
+  device     auto, cpu, cuda:0 and the like          where it learns; auto is where the physics is
   threads    0                                       CPU threads; 0 takes every core
   run.name   by time, agent, budget and seed         folder of the run under run.root=runs
   run.evaluate  true                                 measure the quick metrics of `murmillo evaluate` at the end

@@ -25,6 +25,7 @@ from murmillo.cli.agents import checkpoint_meta, make_agent
 from murmillo.cli.ages import measure_ages
 from murmillo.cli.checks import check_clips, check_settings
 from murmillo.cli.config import TrainConfig
+from murmillo.cli.devices import CPU, for_training
 from murmillo.cli.errors import user_errors
 from murmillo.cli.evaluation.bench import Request
 from murmillo.cli.evaluation.evaluating import evaluate
@@ -34,7 +35,11 @@ from murmillo.cli.evaluation.table import QUICK
 from murmillo.cli.metrics import TRAINING, Metric
 from murmillo.cli.progress import Progress, make_progress
 from murmillo.envs import HumanoidVectorEnv
+from murmillo.envs.devices import on
 from murmillo.envs.motion.licences import terms_of
+
+MATMUL = {"highest": "highest", "tf32": "high"}
+"""Torch's words for how exact products of matrices are."""
 
 FILM_S = 6
 """Length of the film: without a graphics card a second of it takes five to draw."""
@@ -58,9 +63,10 @@ def train(config: TrainConfig, suffix: str = "", ranks: Ranks = ALONE) -> int:
     launch.agreed(ranks, check)
     name = config.run.name or runs.default_name(choices["agent"], choices["budget"], config.seed, suffix)
     folder, resuming = launch.open_run(config, name, ranks)
-    env = HumanoidVectorEnv(config.num_envs // ranks.size, launch.share_threads(config))
+    torch.set_float32_matmul_precision(MATMUL[config.matmul])
+    env = HumanoidVectorEnv(config.num_envs // ranks.size, for_training(launch.share_threads(config)))
     try:
-        with kept(folder, config, resuming, ranks):
+        with kept(folder, config, resuming, ranks), on(env.device):
             return _train(config, env, folder, resuming, ranks)
     finally:
         env.close()
@@ -137,7 +143,8 @@ def _train(config: TrainConfig, env: HumanoidVectorEnv, folder: Path, resuming: 
         report.write(folder)
         print(f"stopped at {runner.samples:,} samples; go on with: murmillo train run.resume={folder}")
         return 0
-    _finish(config, folder)
+    with on(CPU):
+        _finish(config, folder)
     return 0
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from murmillo.envs.devices import Placed
 from murmillo.envs.errors import SuiteError
 from murmillo.envs.kinematics import BodyTree, Joint
 from murmillo.envs.rotations import quat_from_rotvec, quat_to_rotvec
@@ -71,6 +72,7 @@ class Character:
         low, high = torch.from_numpy(model.actuator_ctrlrange.copy()).unbind(-1)
         self.action_offset = 0.5 * (low + high)
         self.action_scale = 0.5 * (high - low)
+        self._offset, self._scale = Placed(self.action_offset), Placed(self.action_scale)
         self.joint_limits = torch.from_numpy(np.vstack([joint_box(model, joint.name) for joint in self.joints]))
         self.base = base or self
         names = {joint.name for joint in self.joints}
@@ -90,7 +92,7 @@ class Character:
 
     def targets(self, action: Tensor) -> Tensor:
         """Actions [..., A] to PD targets [..., A] [rad]; actions are clamped to [-1, 1]."""
-        return self.action_offset.to(action) + self.action_scale.to(action) * action.clamp(-1.0, 1.0)
+        return self._offset.like(action) + self._scale.like(action) * action.clamp(-1.0, 1.0)
 
     def joint_coordinates(self, qpos: Tensor) -> Tensor:
         """What the actuators measure in the pose qpos [..., nq]: exponential maps and angles [..., A] [rad]."""
@@ -103,7 +105,7 @@ class Character:
     def action_for(self, qpos: Tensor) -> Tensor:
         """The action [..., A] whose PD target is the pose qpos [..., nq], clamped to [-1, 1]."""
         coordinates = self.joint_coordinates(qpos)
-        return ((coordinates - self.action_offset.to(qpos)) / self.action_scale.to(qpos)).clamp(-1.0, 1.0)
+        return ((coordinates - self._offset.like(qpos)) / self._scale.like(qpos)).clamp(-1.0, 1.0)
 
     def pose(self, coordinates: Tensor, root_pos_w: Tensor, root_quat_w: Tensor) -> Tensor:
         """Inverse of `joint_coordinates`: qpos [..., nq] of joints [..., A] [rad] and a root [..., 3] [m], [..., 4]."""

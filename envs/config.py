@@ -9,6 +9,7 @@ from murmillo.envs.bodies import BodyConfig
 from murmillo.envs.errors import SuiteError
 from murmillo.envs.falls import FallConfig
 from murmillo.envs.features import FEATURES
+from murmillo.envs.physics import ENGINES
 from murmillo.envs.starts import StartConfig
 from murmillo.envs.tasks.arguments import check_range
 from murmillo.envs.tasks.pushes import PushConfig
@@ -31,7 +32,13 @@ class EnvConfig:
         residual_force: scale of the skeletal residual forces [N] (C.ASE section 3.1); 0 takes them out of the action.
         residual_reward: form of their regularising reward (`ResidualForces.reward`), "sum" (paper) or "mean" (code).
         autoreset: gymnasium's autoreset mode of the vector environment.
-        threads: CPU threads of the physics; 0 takes every CPU.
+        physics: "cpu", MuJoCo's pool of simulations, or "warp", MuJoCo Warp (extra `gpu`; docs/gpu.md).
+        device: where observations, rewards and demonstrations are: "auto" is the CPU, of "warp" the first GPU; "cuda:1"
+            and the like; "cpu", of "warp" its own slow CPU device. With "cpu" physics it may be a GPU all the same, to
+            and from which each step is copied once; all of "warp" is on it.
+        tensors: steps and resets give torch tensors on the device, and take them, in place of numpy arrays.
+        contacts, constraints: that a world of "warp" has room for, the first on average; 0 measures both.
+        threads: CPU threads of the "cpu" physics; 0 takes every CPU.
         camera, width, height: of the frames of `render_mode="rgb_array"`.
         friction: range of the ground's friction, drawn for each episode; None is the MJCF's, which is 1.
         terrain: the ground's shape; what is not flat is observed too.
@@ -50,6 +57,11 @@ class EnvConfig:
     residual_force: float = 0.0
     residual_reward: Literal["sum", "mean"] = "sum"
     autoreset: Literal["same_step", "next_step", "disabled"] = "same_step"
+    physics: Literal["cpu", "warp"] = "cpu"
+    device: str = "auto"
+    tensors: bool = False
+    contacts: int = 0
+    constraints: int = 0
     threads: int = 0
     camera: str = "track"
     width: int = 640
@@ -77,6 +89,7 @@ def check_config(config: EnvConfig, render_mode: str | None, modes: list[str]) -
         check_range("friction", config.friction, least=0.0, of="")
     for name, value, known in (
         ("autoreset", config.autoreset, [mode.name.lower() for mode in AutoresetMode]),
+        ("physics", config.physics, list(ENGINES)),
         ("features", config.features, list(FEATURES)),
         ("residual_reward", config.residual_reward, ["sum", "mean"]),
         ("fall.contact", config.fall.contact, ["ground", "any"]),

@@ -70,9 +70,9 @@ class OutsideForces:
             return {}
         action, force = self._last
         return {
-            "side_rewards": {"residual": self._residual.reward(action).float().numpy()},
-            "residual_force": force.flatten(1).norm(dim=-1).numpy(),
-            "joint_torque": state.actuator_force.norm(dim=-1).numpy(),
+            "side_rewards": {"residual": self._residual.reward(action).float()},
+            "residual_force": force.flatten(1).norm(dim=-1),
+            "joint_torque": state.actuator_force.norm(dim=-1),
         }
 
     def reset(self, env_ids: Tensor, generator: torch.Generator) -> None:
@@ -97,5 +97,5 @@ class OutsideForces:
     def _at(self, body: int, force_w: Tensor) -> Tensor:
         """[N, B, 3]: the forces [N, 3] at one body."""
         forces = torch.zeros(self._num_envs, len(self._bodies), 3, dtype=torch.float64)
-        forces[:, body] = force_w.double()
+        forces[:, body] = force_w.to(forces)
         return forces

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import mujoco
+import numpy as np
 import torch
 from torch import Tensor
 
@@ -24,7 +25,7 @@ def geom_heights(character: Character, qpos: Tensor) -> Tensor:
 def geom_places(character: Character, qpos: Tensor) -> tuple[Tensor, Tensor]:
     """Centres [..., G, 3] of the bodies' geoms in the world, and heights [..., G] of their lowest points [m]."""
     pos, quat = character.forward_kinematics(qpos)
-    geoms = _geoms(character)
+    geoms = _geoms(character, qpos.device)
     quat = quat[..., geoms.body, :]
     centre = pos[..., geoms.body, :] + quat_rotate(quat, geoms.pos.to(qpos))
     w, x, y, z = quat_mul(quat, geoms.quat.to(qpos)).unbind(-1)
@@ -53,11 +54,10 @@ class _Geoms:
 
 
 @lru_cache(maxsize=8)
-def _geoms(character: Character) -> _Geoms:
+def _geoms(character: Character, device: torch.device) -> _Geoms:
     model = character.model
     ids = [geom for geom in range(model.ngeom) if model.geom_bodyid[geom] > 0]
-    radius, disc, half = torch.zeros(len(ids)), torch.zeros(len(ids)), torch.zeros(len(ids), 3)
-    radius, disc, half = radius.double(), disc.double(), half.double()
+    radius, disc, half = (np.zeros(shape) for shape in (len(ids), len(ids), (len(ids), 3)))
     for i, geom in enumerate(ids):
         kind, size = mujoco.mjtGeom(model.geom_type[geom]), model.geom_size[geom]
         if kind == mujoco.mjtGeom.mjGEOM_SPHERE:
@@ -67,8 +67,9 @@ def _geoms(character: Character) -> _Geoms:
         elif kind == mujoco.mjtGeom.mjGEOM_CYLINDER:
             disc[i], half[i, 2] = size[0], size[1]
         elif kind == mujoco.mjtGeom.mjGEOM_BOX:
-            half[i] = torch.from_numpy(size.copy())
+            half[i] = size
         else:
             raise NotImplementedError(f"geom {model.geom(geom).name}: no reach for {kind.name}")
-    pos, quat = torch.from_numpy(model.geom_pos[ids].copy()), torch.from_numpy(model.geom_quat[ids].copy())
-    return _Geoms(torch.as_tensor(model.geom_bodyid[ids] - 1).long(), pos, quat, radius, disc, half)
+    frames = (model.geom_pos[ids], model.geom_quat[ids])
+    body = torch.tensor(model.geom_bodyid[ids] - 1, dtype=torch.int64, device=device)
+    return _Geoms(body, *(torch.tensor(numbers, device=device) for numbers in (*frames, radius, disc, half)))

@@ -40,7 +40,7 @@ def character_state(character: Character, qpos: Tensor, qvel: Tensor, key_pos_w:
     Returns:
         [..., 120] for the sword-and-shield humanoid.
     """
-    layout = _layout(character)
+    layout = _layout(character, qpos.device)
     root_pos_w, root_quat_w = qpos[..., 0:3], qpos[..., 3:7]
     to_heading = quat_conj(heading_quat(root_quat_w))
     root_quat_h = quat_mul(to_heading, root_quat_w)
@@ -72,7 +72,7 @@ def feature_mask(character: Character, masked: Collection[str]) -> Tensor:
     Returns:
         [D] bool.
     """
-    layout, idle = _layout(character), idle_bodies(character, masked)
+    layout, idle = _layout(character, torch.get_default_device()), idle_bodies(character, masked)
     mask = torch.zeros(state_dim(character), dtype=torch.bool)
     rotation, velocity = 13, 13 + layout.width
     for joint in character.joints:
@@ -109,7 +109,7 @@ class _Layout:
 
 
 @lru_cache(maxsize=8)
-def _layout(character: Character) -> _Layout:
+def _layout(character: Character, device: torch.device) -> _Layout:
     column, ball, hinge = 0, [], []
     for joint in character.joints:
         if joint.kind == "ball":
@@ -118,6 +118,6 @@ def _layout(character: Character) -> _Layout:
         else:
             hinge.append((joint.qpos.start, column))
             column += 1
-    ball_qpos, ball_columns = (torch.tensor([list(pair[i]) for pair in ball]) for i in (0, 1))
-    hinge_qpos, hinge_columns = torch.tensor(hinge).unbind(-1)
+    ball_qpos, ball_columns = (torch.tensor([list(pair[i]) for pair in ball], device=device) for i in (0, 1))
+    hinge_qpos, hinge_columns = torch.tensor(hinge, device=device).unbind(-1)
     return _Layout(column, ball_qpos, ball_columns, hinge_qpos, hinge_columns)

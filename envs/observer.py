@@ -61,14 +61,14 @@ class Observer:
         self.frames = frames.clone()
         self._look(state)
 
-    def observation(self, steps: Tensor) -> dict[str, np.ndarray]:
+    def observation(self, steps: Tensor) -> dict[str, Tensor]:
         """The observations of all worlds, steps [N] after their episodes' begin."""
         seen = self._features.state(self.frames[:, -self._features.frames :], steps + 1, self.ground)
         if self._window > 1:
             seen["window"] = self._features.window(self.frames[:, -self._window :], self.ground)
         if self._terrain is not None:
             seen["heights"] = self._map
-        return {name: value.clamp(-LIMIT, LIMIT).numpy() for name, value in seen.items()}
+        return {name: value.clamp(-LIMIT, LIMIT) for name, value in seen.items()}
 
     def _newest(self, state: State, worlds: Worlds = slice(None)) -> Tensor:
         ground = None if self.ground is None else self.ground[worlds]

@@ -19,7 +19,9 @@ class ResidualForces:
         """`scale` [N] is the force of a component of 1; `reward` is the form of the regularising reward."""
         self.scale = scale
         self._total = torch.sum if reward == "sum" else torch.mean
-        self._bodies = character.body_ids(tuple(body for body in character.bodies if body not in _UNASSISTED))
+        self._bodies = torch.tensor(
+            character.body_ids(tuple(body for body in character.bodies if body not in _UNASSISTED))
+        )
         self._num_bodies = len(character.bodies)
 
     @property

@@ -54,6 +54,12 @@ class Scene:
             # each prop is a tree of its own; what does not touch is solved for apart, which is quicker
             self.model.opt.disableflags &= ~int(mujoco.mjtDisableBit.mjDSBL_ISLAND)
 
+    @property
+    def feels_everything(self) -> bool:
+        """Whether the bodies feel all that touches them as if it were the ground (`count_every_contact`)."""
+        sensor = self.model.sensor(_GROUND + self.character.bodies[0])
+        return int(sensor.reftype[0]) == mujoco.mjtObj.mjOBJ_UNKNOWN
+
     def render_model(self, offscreen: tuple[int, int] | None = None) -> mujoco.MjModel:
         """The model with its visual geoms, for pictures; its qpos layout is that of `model`."""
         spec = self._spec.copy()

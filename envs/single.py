@@ -22,7 +22,7 @@ class HumanoidEnv(gymnasium.Env):
         task: Task | None = None,
         render_mode: Literal["rgb_array", "human"] | None = None,
     ) -> None:
-        config = dataclasses.replace(config or EnvConfig(threads=1), autoreset="disabled")
+        config = dataclasses.replace(config or EnvConfig(threads=1), autoreset="disabled", tensors=False)
         self.vector = HumanoidVectorEnv(1, config, task, render_mode)
         self.render_mode = render_mode
         self.observation_space = self.vector.single_observation_space

@@ -6,6 +6,7 @@ import torch
 from torch import Tensor
 
 from murmillo.envs.character import Character
+from murmillo.envs.devices import on
 from murmillo.envs.errors import SuiteError
 from murmillo.envs.geometry import lowest_point
 from murmillo.envs.motion import MotionLibrary
@@ -83,7 +84,7 @@ class StartSampler:
         self._pool: Tensor | None = None
         self.on_ground = True
         """Whether episodes may begin on the ground: fallen, or where the last one fell."""
-        self._default = character.default_qpos.clone()
+        self._default = character.default_qpos.clone().to(torch.get_default_device())
         self._grown = (character.default_qpos[2] - character.base.default_qpos[2]).item()
         self._default[2] = config.default_height + self._grown
 
@@ -126,25 +127,31 @@ class StartSampler:
         self._references.stock = tuple(state[name].clone() for name in _STOCKED) if state else None
 
     def _fallen_states(self) -> Tensor:
+        """[P, nq] `_drop`, made once."""
+        if self._pool is None:
+            device = self._default.device
+            with on(torch.device("cpu")):
+                self._pool = self._drop(self._default.cpu()).to(device)
+        return self._pool
+
+    def _drop(self, default: Tensor) -> Tensor:
         """[P, nq] poses of characters that were dropped 2.5 s ago, turned at random, with a random constant action.
 
-        Made once, from a generator of their own, so that they are the same in every run.
+        They come from a generator of their own and from MuJoCo on the CPU, so that they are the same in every run.
         """
-        if self._pool is None:
-            generator, n = torch.Generator().manual_seed(0), self._pool_size
-            physics = make_physics(self._character, n, threads=self._threads)
-            qpos = self._default.repeat(n, 1)
-            low, high = self.config.drop_height
-            qpos[:, 2] = self._grown + low + (high - low) * torch.rand(n, generator=generator, dtype=torch.float64)
-            orientation = torch.randn(n, 4, generator=generator, dtype=torch.float64)
-            qpos[:, 3:7] = orientation / orientation.norm(dim=-1, keepdim=True)
-            physics.write(torch.arange(n), qpos, torch.zeros_like(physics.state.qvel))
-            action = torch.rand(n, self._character.action_dim, generator=generator, dtype=torch.float64) - 0.5
-            target = self._character.targets(action)
-            for _ in range(75):
-                physics.step(target)
-            self._pool = physics.state.qpos.clone()
-        return self._pool
+        generator, n = torch.Generator().manual_seed(0), self._pool_size
+        physics = make_physics(self._character, n, threads=self._threads)
+        qpos = default.repeat(n, 1)
+        low, high = self.config.drop_height
+        qpos[:, 2] = self._grown + low + (high - low) * torch.rand(n, generator=generator, dtype=torch.float64)
+        orientation = torch.randn(n, 4, generator=generator, dtype=torch.float64)
+        qpos[:, 3:7] = orientation / orientation.norm(dim=-1, keepdim=True)
+        physics.write(torch.arange(n), qpos, torch.zeros_like(physics.state.qvel))
+        action = torch.rand(n, self._character.action_dim, generator=generator, dtype=torch.float64) - 0.5
+        target = self._character.targets(action)
+        for _ in range(75):
+            physics.step(target)
+        return physics.state.qpos.clone()
 
 
 class _ReferenceStock:

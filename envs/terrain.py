@@ -10,6 +10,7 @@ import torch
 from torch import Tensor
 
 from murmillo.envs.character import Character
+from murmillo.envs.devices import Placed
 from murmillo.envs.errors import SuiteError
 from murmillo.envs.geometry import geom_places
 from murmillo.envs.rotations import heading
@@ -63,12 +64,11 @@ class Terrain:
         """Half the field's edge [m]."""
         ground, blocks = _field(config, random)
         self._heights = ground + OBSTACLE_HEIGHT * blocks
-        self._spots = torch.from_numpy(_spots(config, blocks, random))
-        self._planes = torch.from_numpy(_planes(self._heights))
-        self._planes_float32 = self._planes.float()
+        spots, planes = torch.from_numpy(_spots(config, blocks, random)), torch.from_numpy(_planes(self._heights))
+        self._spots, self._planes, self._planes_float32 = Placed(spots), Placed(planes), Placed(planes.float())
         ahead, aside = (torch.linspace(*ends, n) for ends, n in zip((MAP_AHEAD, MAP_ASIDE), MAP_SHAPE, strict=True))
         x, y = torch.meshgrid(ahead, aside, indexing="ij")
-        self._map_points = torch.stack((x.flatten(), y.flatten(), torch.ones(x.numel())))
+        self._map_points = Placed(torch.stack((x.flatten(), y.flatten(), torch.ones_like(x).flatten())))
 
     def edit(self, spec: mujoco.MjSpec) -> None:
         """Lay it out in place of the floor."""
@@ -82,7 +82,7 @@ class Terrain:
     def height(self, pos_w: Tensor) -> Tensor:
         """Heights of the ground [...] [m] at the places pos_w [..., 2 or more]; beyond the field, its rim's."""
         x, y = ((pos_w[..., :2].double() + self.half) / self.spacing).unbind(-1)
-        return self._interpolate(x, y, self._planes)
+        return self._interpolate(x, y, self._planes.on(x.device))
 
     def map(self, root_pos_w: Tensor, root_quat_w: Tensor) -> Tensor:
         """[n, 35, 35] float32 heights of the ground about each root [m], over the ground under it.
@@ -96,9 +96,10 @@ class Terrain:
         yaw = heading(root_quat_w)
         c, s = yaw.cos() / self.spacing, yaw.sin() / self.spacing
         x, y = ((root_pos_w[:, :2] + self.half) / self.spacing).unbind(-1)
-        x = torch.stack((c, -s, x), dim=-1).float() @ self._map_points
-        y = torch.stack((s, c, y), dim=-1).float() @ self._map_points
-        heights = self._interpolate(x, y, self._planes_float32)
+        points = self._map_points.on(x.device)
+        x = torch.stack((c, -s, x), dim=-1).float() @ points
+        y = torch.stack((s, c, y), dim=-1).float() @ points
+        heights = self._interpolate(x, y, self._planes_float32.on(x.device))
         return (heights - self.height(root_pos_w).float().unsqueeze(-1)).unflatten(-1, MAP_SHAPE)
 
     def contains(self, pos_w: Tensor) -> Tensor:
@@ -111,7 +112,8 @@ class Terrain:
         Nothing of them is then below the ground, by the middles of their geoms.
         """
         spot = torch.randint(_SPOTS, (len(worlds),), generator=generator)
-        place = self._spots[worlds % len(self._spots), spot]
+        spots = self._spots.on(worlds.device)
+        place = spots[worlds % len(spots), spot]
         by = torch.cat((place - qpos[:, :2], self.height(place).unsqueeze(-1)), dim=-1)
         centre, lowest = geom_places(character, qpos)
         above = lowest + by[:, 2:] - self.height(centre[..., :2] + by[:, None, :2])

@@ -1,6 +1,6 @@
 """N worlds of the character in one physics batch, as a gymnasium vector environment."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Literal
 
 import gymnasium
@@ -14,6 +14,7 @@ from torch import Tensor
 
 from murmillo.envs.bodies import load_body
 from murmillo.envs.config import EnvConfig, check_config
+from murmillo.envs.devices import at_home, find_device, on
 from murmillo.envs.errors import SuiteError
 from murmillo.envs.falls import FallDetector, count_every_contact
 from murmillo.envs.features import make_features
@@ -21,7 +22,7 @@ from murmillo.envs.forces import OutsideForces
 from murmillo.envs.motion import MotionLibrary, load_clips
 from murmillo.envs.motion.demonstrations import Demonstrations
 from murmillo.envs.observer import Observer, box
-from murmillo.envs.physics import State, make_physics
+from murmillo.envs.physics import Physics, State, make_physics
 from murmillo.envs.rendering import FrameRenderer, Window, make_screen
 from murmillo.envs.scene import Scene, slippery
 from murmillo.envs.skills import CommandedSkills
@@ -58,6 +59,9 @@ class HumanoidVectorEnv(VectorEnv):
     SAME_STEP mode `final_obs`, the observation before any reset for all N worlds, with its mask `_final_obs` [N]. With
     residual forces also `side_rewards`, terms that are not the task's ("residual", their regularising reward), and the
     L2 norms [N] of `residual_force` [N] over all joints and of `joint_torque` [N m], of the PD control, over all axes.
+
+    With `tensors` all of these are torch tensors on `device` in place of arrays; `home` is where the physics and all
+    state around it are.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array", "human"], "render_fps": 30}  # noqa: RUF012 gymnasium's own type
@@ -83,10 +87,34 @@ class HumanoidVectorEnv(VectorEnv):
         self.scene = Scene(self.character, self._lay_out)
         features, followed = make_features(config.features, self.character), self.character.base
         clips = load_clips(config.motions, followed, config.clips)
-        self.library = MotionLibrary(clips, followed, features=features)
         if self.terrain is not None and self.scene.props:
             raise SuiteError(f"terrain: the props of {type(self.task).__name__} need level ground; leave it flat")
-        self.physics = make_physics(self.scene, num_envs, threads=config.threads)
+        self.physics = self._make_physics()
+        self.home = self.physics.device
+        self.device = find_device(config.device) if config.physics == "cpu" else self.home
+        self.library = MotionLibrary(clips, followed, self.home, features)
+        with on(self.home):
+            self._surround()
+        shown = self.library if self.device == self.home else MotionLibrary(clips, followed, self.device, features)
+        self.demonstrations = Demonstrations(shown, self.character, config.window, self._action_dim)
+        self._screen: FrameRenderer | Window | None = None
+
+    def _make_physics(self) -> Physics:
+        config = self.config
+        if config.physics == "cpu":
+            return make_physics(self.scene, self.num_envs, threads=config.threads)
+        return make_physics(
+            self.scene,
+            self.num_envs,
+            backend=config.physics,
+            device=config.device,
+            contacts=config.contacts,
+            constraints=config.constraints,
+        )
+
+    def _surround(self) -> None:
+        """Make all that keeps a state beside the physics."""
+        config, num_envs, features = self.config, self.num_envs, self.library.features
         self.task.bind(num_envs, self.character)
         self._fallen = FallDetector(self.character, config.fall)
         self._observer = Observer(features, num_envs, config.window, self.terrain)
@@ -94,20 +122,23 @@ class HumanoidVectorEnv(VectorEnv):
         self._starts = StartSampler(self.character, self.library, config.starts, num_envs, frames, config.threads)
         self._forces = OutsideForces(self.character, config, num_envs)
         self._set_spaces()
-        self.demonstrations = Demonstrations(self.library, self.character, config.window, self._action_dim)
-        self._generator = torch.Generator()
+        self._generator = torch.Generator(self.home)
         self._generator.seed()
         self._steps = torch.zeros(num_envs, dtype=torch.int64)
         self._free_steps = torch.zeros(num_envs, dtype=torch.int64)
         self._skills = CommandedSkills(self.library.skills, num_envs)
         self._ended = torch.zeros(num_envs, dtype=torch.bool)
         self._fell = torch.zeros(num_envs, dtype=torch.bool)
-        self._screen: FrameRenderer | Window | None = None
 
     @property
     def skills(self) -> tuple[str, ...]:
         """Names of the labels that `skill` counts."""
         return self.library.skills
+
+    @property
+    def tensors(self) -> bool:
+        """Whether steps and resets give tensors."""
+        return self.config.tensors
 
     @property
     def state(self) -> State:
@@ -116,9 +147,10 @@ class HumanoidVectorEnv(VectorEnv):
 
     # --- gymnasium ---------------------------------------------------------------------------------------------------
 
+    @at_home
     def reset(
         self, *, seed: int | Sequence[int] | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+    ) -> tuple[dict[str, Any], dict[str, Any]]:
         """Begin new episodes.
 
         Args:
@@ -136,16 +168,15 @@ class HumanoidVectorEnv(VectorEnv):
         start = options.get("start")
         if start is not None and start not in KINDS[:RECOVERY]:
             raise SuiteError(f"options['start']={start}: no such start; there are: {', '.join(KINDS[:RECOVERY])}")
-        mask = torch.as_tensor(options.get("reset_mask", np.ones(self.num_envs, dtype=bool)))
+        mask = torch.as_tensor(options.get("reset_mask", np.ones(self.num_envs, dtype=bool)), device=self.home)
         self._restart(mask, None if start is None else KINDS.index(start))
-        return self._observation(), {"fall": np.zeros(self.num_envs, dtype=bool)}
+        return self._shown(self._observation()), self._shown({"fall": torch.zeros(self.num_envs, dtype=torch.bool)})
 
-    def step(
-        self, actions: np.ndarray | Tensor
-    ) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
+    @at_home
+    def step(self, actions: np.ndarray | Tensor) -> tuple[dict[str, Any], Any, Any, Any, dict[str, Any]]:
         """Advance all worlds by 1/30 s. See the class for what comes back."""
         resetting = self._ended & (self._mode is AutoresetMode.NEXT_STEP)
-        residual = self._advance(torch.as_tensor(actions))
+        residual = self._advance(torch.as_tensor(actions, device=self.home))
         terms = {name: term.masked_fill(resetting, 0.0) for name, term in self.task.reward(self.state).items()}
         healed = self.physics.healed()
         fall = self._fallen(self.state, self._observer.ground) & (self._steps > 1) & (self._free_steps == 0)
@@ -157,18 +188,18 @@ class HumanoidVectorEnv(VectorEnv):
         self._pass_time()
         self._ended, self._fell = terminated | truncated, torch.where(resetting, self._fell, fall)
         info: dict[str, Any] = {
-            "reward_terms": {name: term.numpy() for name, term in terms.items()},
-            "fall": (fall & terminated).numpy(),
-            "healed": healed.numpy(),
+            "reward_terms": terms,
+            "fall": fall & terminated,
+            "healed": healed,
             **residual,
         }
         if self._mode is AutoresetMode.SAME_STEP:
-            info["final_obs"], info["_final_obs"] = self._observation(), self._ended.numpy()
+            info["final_obs"], info["_final_obs"] = self._observation(), self._ended
             self._restart(self._ended)
         else:
             self._restart(resetting)
-        reward = torch.stack(list(terms.values())).sum(0)
-        return self._observation(), reward.numpy().astype(np.float64), terminated.numpy(), truncated.numpy(), info
+        reward = torch.stack(list(terms.values())).sum(0).double()
+        return self._shown((self._observation(), reward, terminated, truncated, info))
 
     def render(self) -> tuple[np.ndarray, ...] | None:
         """Frames [height, width, 3] of the worlds, of the first 16 at most; `render_mode="human"` shows world 0."""
@@ -179,15 +210,17 @@ class HumanoidVectorEnv(VectorEnv):
             self._screen = make_screen(self.scene, human, config.width, config.height, config.camera)
         state, worlds = self.state, range(min(self.num_envs, RENDERED_WORLDS))
         poses = torch.cat((state.qpos, state.prop_qpos.flatten(1)), dim=-1)[: len(worlds)]
-        return self._screen.draw(poses.numpy(), [self.task.markers(state, world) for world in worlds])
+        return self._screen.draw(poses.cpu().double().numpy(), [self.task.markers(state, world) for world in worlds])
 
     def close_extras(self, **kwargs: Any) -> None:
         if self._screen is not None:
             self._screen.close()
             self._screen = None
+        self.physics.close()
 
     # --- directions ---------------------------------------------------------------------------------------------------
 
+    @at_home
     def set_skill(self, skill: str | int, env_ids: Sequence[int] | None = None) -> None:
         """Command a skill from now on, until the episode's end.
 
@@ -199,7 +232,7 @@ class HumanoidVectorEnv(VectorEnv):
 
     def set_skill_weights(self, weights: Tensor | None) -> None:
         """Draw the skills of new episodes with these probabilities, [K] and not negative; None draws all alike."""
-        self._skills.weigh(weights)
+        self._skills.weigh(None if weights is None else weights.to(self.home))
 
     def set_ground_contact(self, allowed: bool) -> None:
         """Whether bodies other than the feet may touch the ground as `fall` and `starts` say; else any touch is a fall.
@@ -211,6 +244,7 @@ class HumanoidVectorEnv(VectorEnv):
         self._fallen.touch_is_fall = not allowed
         self._starts.on_ground = allowed
 
+    @at_home
     def push(self, force_w: Tensor, body: str | None = None) -> None:
         """Push the character from outside, throughout the next step and no longer; pushes add up.
 
@@ -220,14 +254,16 @@ class HumanoidVectorEnv(VectorEnv):
             force_w: [N, 3] [N] at the body's origin, beside any residual force there.
             body: its name; None is the root.
         """
-        self._forces.push(force_w, body)
+        self._forces.push(force_w.to(self.home), body)
 
-    def observation(self) -> dict[str, np.ndarray]:
+    @at_home
+    def observation(self) -> dict[str, Any]:
         """The current observation, which a `set_skill` since the last step has changed."""
-        return self._observation()
+        return self._shown(self._observation())
 
     # --- checkpoints -------------------------------------------------------------------------------------------------
 
+    @at_home
     def state_dict(self) -> dict[str, Any]:
         """All that the next step depends on."""
         parts = {"physics": self.physics.state_dict(), "starts": self._starts.state_dict()}
@@ -236,13 +272,16 @@ class HumanoidVectorEnv(VectorEnv):
         seen = {"history": self._observer.frames.clone(), "skill": self._skills.current.clone()}
         return {**parts, "generator": self._generator.get_state(), **seen, **own}
 
+    @at_home
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Continue from `state_dict`, bit for bit."""
+        generator = state["generator"].cpu()
+        state = _moved(state, self.home)
         self.physics.load_state_dict(state["physics"])
         self._starts.load_state_dict(state["starts"])
         self.task.load_state_dict(state["task"])
         self._forces.load_state_dict(state["forces"])
-        self._generator.set_state(state["generator"])
+        self._generator.set_state(generator)
         self._observer.load(self.state, state["history"])
         self._skills.current = state["skill"].clone()
         for name in _OWN_STATE:
@@ -273,7 +312,7 @@ class HumanoidVectorEnv(VectorEnv):
         expected = (self.num_envs, self._action_dim)
         if action.shape != expected:
             raise SuiteError(f"action of shape {tuple(action.shape)}: needs {expected}")
-        action = action.double()
+        action = action.to(self.state.qpos.dtype)
         joints, extra = action.split([self.character.action_dim, expected[1] - self.character.action_dim], dim=-1)
         force = self._forces.of_step(extra, self.state, self.task.push(self.state))
         self.physics.step(self.character.targets(joints), force)
@@ -312,8 +351,33 @@ class HumanoidVectorEnv(VectorEnv):
             if len(due):
                 self._skills.draw(due, self._generator)
 
-    def _observation(self) -> dict[str, np.ndarray]:
-        observation = {**self._observer.observation(self._steps), "skill": self._skills.current.numpy().copy()}
+    def _observation(self) -> dict[str, Tensor]:
+        observation = {**self._observer.observation(self._steps), "skill": self._skills.current.clone()}
         if self.task.goal_dim:
-            observation["goal"] = self.task.goal(self.state).numpy()
+            observation["goal"] = self.task.goal(self.state)
         return observation
+
+    def _shown(self, result: Any) -> Any:
+        """The tensors in a result as the environment gives them out: on its device, or as arrays."""
+        return _moved(result, self.device) if self.config.tensors else _arrays(result)
+
+
+def _moved(result: Any, device: torch.device) -> Any:
+    """A result with its tensors on the device."""
+    return _each(result, lambda tensor: tensor.to(device))
+
+
+def _arrays(result: Any) -> Any:
+    """A result with arrays in place of tensors."""
+    return _each(result, lambda tensor: tensor.cpu().numpy())
+
+
+def _each(result: Any, change: Callable[[Tensor], Any]) -> Any:
+    """The result with its tensors changed, however deep they are in tuples and dicts."""
+    if isinstance(result, Tensor):
+        return change(result)
+    if isinstance(result, tuple):
+        return tuple(_each(part, change) for part in result)
+    if isinstance(result, dict):
+        return {name: _each(part, change) for name, part in result.items()}
+    return result

@@ -119,7 +119,7 @@ class AdaptNet:
                 means.add({**loss.parts, **loss.scores})
 
         told = self.observed.told
-        seen = Rollout(*rollout.shape, rollout.ranks)
+        seen = rollout.alike()
         for name in ("action", "log_prob", "advantage", "return", *told):
             seen[name] = rollout[name]
         seen["state"] = self.observed.state({"state": rollout["state"]})

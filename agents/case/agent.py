@@ -206,7 +206,8 @@ class CASE:
         """
         agent = self.head_scores(rollout)
         started = self.iterations >= self.config.focal_start
-        self.focal.update(agent["right"].flatten(), rollout.flat("label"), active=started, ranks=rollout.ranks)
+        labels = rollout["label"].flatten()
+        self.focal.update(agent["right"].flatten(), labels, active=started, ranks=rollout.ranks)
         scores = {"agent": agent, "demonstration": self._heads(demonstrations)}
         means = {f"{who}_{head}": s.mean().item() for who, heads in scores.items() for head, s in heads.items()}
         return rollout.ranks.mean_scalars(means)

@@ -17,19 +17,20 @@ class EpisodeStatistics:
         self._clear()
 
     def _clear(self) -> None:
-        self._ended = self._fallen = self._steps = 0
+        self._ended, self._fallen, self._steps = torch.zeros(3, dtype=torch.int64)
 
     def step(self, terminated: Tensor, done: Tensor) -> None:
         """One step of every world; bool `[N]`, `done` is terminated or truncated."""
         self.length += 1
-        self._ended += int(done.sum())
-        self._fallen += int(terminated.sum())
-        self._steps += int(self.length[done].sum())
+        self._ended += done.sum()
+        self._fallen += terminated.sum()
+        self._steps += (self.length * done).sum()
         self.length[done] = 0
 
     def summary(self, ranks: Ranks = ALONE) -> dict[str, float]:
         """Mean length [steps] and share of terminations among the episodes that ended; NaN where none did."""
-        ended, fallen, steps = ranks.sum(torch.tensor([self._ended, self._fallen, self._steps])).tolist()
+        counted = torch.stack([torch.as_tensor(count) for count in (self._ended, self._fallen, self._steps)])
+        ended, fallen, steps = ranks.sum(counted).tolist()
         ended = ended or math.nan
         summary = {"episode/length": steps / ended, "episode/fall_rate": fallen / ended}
         self._clear()

@@ -13,9 +13,9 @@ from torch import Tensor
 from murmillo.agents.common.decoder import Command, Decoder, SphereDecoder
 from murmillo.agents.common.errors import AgentError
 from murmillo.agents.common.interface import Agent, Obs, Steerable
-from murmillo.agents.common.rollout import Rollout, tensors, true_next_obs
+from murmillo.agents.common.rollout import Rollout, taken, tensors, true_next_obs
 
-Results = tuple[dict[str, np.ndarray], np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]
+Results = tuple[dict[str, Any], Any, Any, Any, dict[str, Any]]
 """What `step` gives: observations, reward `[N]`, terminated `[N]`, truncated `[N]`, infos."""
 
 LatentTerms = Callable[[Tensor, Obs], Mapping[str, Tensor]]
@@ -127,7 +127,14 @@ class LatentEnv(VectorWrapper):
             results, judged = self._low_step(command)
             decision.add(results, {**judged, **chosen})
         obs, *_ = results
-        return obs, *decision.outcome(self.config.steps)
+        outcome = decision.outcome(self.config.steps)
+        reward, terminated, truncated, infos = outcome if self.tensors else _arrays(outcome)
+        return obs, reward, terminated, truncated, infos
+
+    @property
+    def tensors(self) -> bool:
+        """Whether it shows tensors, as the environment does."""
+        return getattr(self.env, "tensors", False)
 
     def _low_step(self, command: Command) -> tuple[Results, dict[str, Tensor]]:
         """One step of the environment, and what the low-level agent thinks of it: its terms `[N]` by name."""
@@ -135,7 +142,7 @@ class LatentEnv(VectorWrapper):
         obs = self._obs | command.observed
         step = self.low.act(obs, deterministic=True)
         row.store(0, {**obs, **step.extras, "action": step.action, "log_prob": step.log_prob})
-        results = self.env.step(step.action.numpy())
+        results = self.env.step(taken(self.env, step.action))
         next_obs, *_, infos = results
         row.store(0, {f"next_{name}": value for name, value in true_next_obs(next_obs, infos).items()})
         self._obs = tensors(next_obs)
@@ -158,7 +165,7 @@ class LatentEnv(VectorWrapper):
         """Continue from `state_dict`, bit for bit."""
         self.env.load_state_dict(state["env"])
         self._obs = state["obs"]
-        self.low.generator.set_state(state["generator"])
+        self.low.generator.set_state(state["generator"].cpu())
 
 
 class _Decision:
@@ -166,7 +173,7 @@ class _Decision:
 
     def __init__(self, num_envs: int) -> None:
         self._going = torch.ones(num_envs, dtype=torch.bool)
-        self._terminated = self._truncated = ~self._going
+        self._terminated = self._truncated = self._healed = ~self._going
         self._sums: dict[str, dict[str, Tensor]] = {}
         self._final: Obs = {}
 
@@ -181,6 +188,8 @@ class _Decision:
             self._final[name] = torch.where(going, value, self._final.get(name, value))
         self._terminated = self._terminated | self._going & torch.as_tensor(terminated)
         self._truncated = self._truncated | self._going & torch.as_tensor(truncated)
+        if "healed" in infos:
+            self._healed = self._healed | self._going & torch.as_tensor(infos["healed"])
         self._going = ~(self._terminated | self._truncated)
 
     def _sum(self, group: str, terms: Mapping[str, Any]) -> None:
@@ -188,12 +197,18 @@ class _Decision:
         for name, term in terms.items():
             sums[name] = sums.get(name, 0.0) + torch.where(self._going, torch.as_tensor(term), 0.0)
 
-    def outcome(self, steps: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
+    def outcome(self, steps: int) -> tuple[Tensor, Tensor, Tensor, dict[str, Any]]:
         """Reward, terminated, truncated and infos of the decision, which has taken so many steps."""
-        means = {
-            group: {name: (total / steps).numpy() for name, total in sums.items()} for group, sums in self._sums.items()
-        }
+        means = {group: {name: total / steps for name, total in sums.items()} for group, sums in self._sums.items()}
         reward = means.pop("task")["reward"]
-        final = {name: value.numpy() for name, value in self._final.items()}
-        infos = {**means, "final_obs": final, "_final_obs": (~self._going).numpy()}
-        return reward, self._terminated.numpy(), self._truncated.numpy(), infos
+        infos = {**means, "final_obs": self._final, "_final_obs": ~self._going, "healed": self._healed}
+        return reward, self._terminated, self._truncated, infos
+
+
+def _arrays(result: Any) -> Any:
+    """Arrays in place of the tensors in tuples and dicts."""
+    if isinstance(result, Tensor):
+        return result.cpu().numpy()
+    if isinstance(result, tuple):
+        return tuple(_arrays(part) for part in result)
+    return {name: _arrays(part) for name, part in result.items()}

@@ -188,9 +188,9 @@ class PPO:
             AgentError: the minibatch is larger than the rollout.
         """
         config = self.config
-        if config.minibatch > rollout.part.total:
+        if config.minibatch > rollout.all_samples:
             raise AgentError(
-                f"ppo.minibatch={config.minibatch} is larger than the {rollout.part.total} samples of an iteration "
+                f"ppo.minibatch={config.minibatch} is larger than the {rollout.all_samples} samples of an iteration "
                 f"({rollout.horizon} steps of {rollout.num_envs * rollout.ranks.size} worlds)"
             )
         data = {name: rollout.flat(name) for name in ("action", "log_prob", "advantage", *fields)}

@@ -14,7 +14,8 @@ from murmillo.agents.common.ranks import ALONE, Part, Ranks
 class Rollout:
     """T steps of N worlds as named tensors `[T, N, ...]` of float32, int64 or bool.
 
-    A field is allocated when it is first stored and lives on, so that an iteration writes where the last one wrote.
+    A field is allocated when it is first stored, on the device of its values, and lives on, so that an iteration writes
+    where the last one wrote.
     "state", "skill", ... are what the agent saw, "next_state", ... their true successors (`true_next_obs`).
 
     Attributes:
@@ -22,23 +23,26 @@ class Rollout:
         num_envs: N, this rank's worlds.
         ranks: who have as many each.
         part: which of all ranks' samples, counted step by step and in each step rank by rank, are this one's.
+        kept: indices of the rows of `flat` among the T N; None keeps all.
     """
 
     def __init__(self, horizon: int, num_envs: int, ranks: Ranks = ALONE) -> None:
         self.horizon = horizon
         self.num_envs = num_envs
         self.ranks = ranks
-        self.part = Part(ranks, self.samples)
+        self._all = Part(ranks, self.samples)
         if ranks.size > 1:
             places = torch.arange(self.samples * ranks.size).view(horizon, -1)
-            self.part = ranks.part(places.numel(), ranks.worlds(num_envs).of(places.T).T.flatten())
+            self._all = ranks.part(places.numel(), ranks.worlds(num_envs).of(places.T).T.flatten())
+        self.part = self._all
+        self.kept: Tensor | None = None
         self._fields: dict[str, Tensor] = {}
 
     def store(self, t: int, fields: Mapping[str, Tensor]) -> None:
         """Copy each `[N, ...]` of `fields` into row `t`."""
         for name, value in fields.items():
             if name not in self._fields:
-                self._fields[name] = torch.empty(self.horizon, *value.shape, dtype=_kind(value))
+                self._fields[name] = torch.empty(self.horizon, *value.shape, dtype=_kind(value), device=value.device)
             self._fields[name][t] = value
 
     def __getitem__(self, name: str) -> Tensor:
@@ -65,9 +69,28 @@ class Rollout:
         """T N."""
         return self.horizon * self.num_envs
 
+    @property
+    def all_samples(self) -> int:
+        """T N of all ranks together."""
+        return self._all.total
+
+    def leave_out(self, rows: Tensor) -> None:
+        """Learn nothing from these steps `[T, N]` bool: `flat` and minibatches lack them. All ranks must call it."""
+        self.kept, self.part = None, self._all
+        if self.ranks.any(bool(rows.any())):
+            self.kept = (~rows).flatten().nonzero().flatten()
+            self.part = self.ranks.among(len(self.kept))
+
+    def alike(self) -> "Rollout":
+        """An empty rollout of the same steps, with the same ones left out."""
+        other = Rollout(self.horizon, self.num_envs, self.ranks)
+        other.kept, other.part = self.kept, self.part
+        return other
+
     def flat(self, name: str) -> Tensor:
-        """The field as a view `[T N, ...]`."""
-        return self[name].flatten(0, 1)
+        """The field `[T N, ...]`, a view where no row is left out."""
+        rows = self[name].flatten(0, 1)
+        return rows if self.kept is None else rows[self.kept]
 
     def minibatches(self, size: int, generator: torch.Generator) -> Iterator[tuple[Tensor, Part]]:
         """Every row once, in random order, as `draw` gives them; the last minibatch may be smaller."""
@@ -82,6 +105,11 @@ def _kind(value: Tensor) -> torch.dtype:
     if value.dtype == torch.bool:
         return torch.bool
     return torch.float32 if value.is_floating_point() else torch.int64
+
+
+def taken(env: Any, action: Tensor) -> Any:
+    """The action as the environment takes it: a tensor where it shows tensors (its `tensors`), else an array."""
+    return action if getattr(env, "tensors", False) else action.cpu().numpy()
 
 
 def tensors(obs: Any) -> dict[str, Tensor]:

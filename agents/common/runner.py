@@ -19,7 +19,7 @@ from murmillo.agents.common.failures import WatchConfig
 from murmillo.agents.common.interface import Agent, Directing, MultiObjective
 from murmillo.agents.common.logger import Logger
 from murmillo.agents.common.ranks import ALONE, Ranks
-from murmillo.agents.common.rollout import Rollout, tensors, true_next_obs
+from murmillo.agents.common.rollout import Rollout, taken, tensors, true_next_obs
 from murmillo.agents.common.watch import Watch
 
 _SAVED = ("meta", "agent", "generator", "samples", "iteration", "watch")
@@ -71,6 +71,10 @@ class Runner:
     Ranks that share a run have a runner each, with a share of the worlds, and do everything at a time; the first one
     writes. The checkpoint is that of one process with all the worlds, but for what the worlds are in: as many ranks as
     there were go on exactly, another number of them with fresh episodes.
+
+    Nothing is learned from steps in which a world's simulation diverged (`infos["healed"]`).
+
+    Tensors are where the generator is; on a GPU, make the agent and call the runner in `with torch.device(...)`.
     """
 
     def __init__(
@@ -168,13 +172,15 @@ class Runner:
             step = self.agent.act(obs)
             seen = {name: value for name, value in obs.items() if name in self.agent.needs}
             rollout.store(t, {**seen, **step.extras, "action": step.action, "log_prob": step.log_prob})
-            next_obs, reward, terminated, truncated, infos = self.env.step(step.action.numpy())
+            next_obs, reward, terminated, truncated, infos = self.env.step(taken(self.env, step.action))
 
             successor = {f"next_{name}": value for name, value in true_next_obs(next_obs, infos).items()}
             successor = {name: value for name, value in successor.items() if name in self.agent.needs}
             ends = {"terminated": torch.as_tensor(terminated), "truncated": torch.as_tensor(truncated)}
             side = {name: torch.as_tensor(term) for name, term in infos.get("side_rewards", {}).items()}
             rollout.store(t, {**successor, **ends, "task": torch.as_tensor(reward), **side})
+            if "healed" in infos:
+                rollout.store(t, {"healed": torch.as_tensor(infos["healed"])})
             done = ends["terminated"] | ends["truncated"]
             self._episodes.step(ends["terminated"], done)
             if done.any() or self.ranks.size > 1:
@@ -227,6 +233,8 @@ class Runner:
         next_obs = {name[5:]: rollout[name] for name in self.agent.needs if name.startswith("next_")}
         value, next_value = self.agent.value(obs, extras), self.agent.value(next_obs, extras)
         done = rollout["terminated"] | rollout["truncated"]
+        if "healed" in rollout:
+            self._leave_out(rollout, rollout["healed"], value)
         advantage = gae(
             rollout["reward"], value, next_value, rollout["terminated"], done, self.config.gamma, self.config.lam
         )
@@ -236,6 +244,12 @@ class Runner:
             rollout["advantage"] = weigh_advantages(advantage, weights, ranks=self.ranks)
         else:
             rollout["advantage"] = normalise_advantage(advantage, ranks=self.ranks)
+
+    def _leave_out(self, rollout: Rollout, healed: Tensor, value: Tensor) -> None:
+        """Learn nothing from steps in which a simulation diverged; the steps before them end in the expected return."""
+        rollout.leave_out(healed)
+        wide = healed.view(*rollout.shape, *[1] * (value.dim() - 2))
+        rollout["reward"] = torch.where(wide, value, rollout["reward"])
 
     def _check(self, scalars: Mapping[str, float]) -> None:
         for name, value in scalars.items():
@@ -247,13 +261,14 @@ class Runner:
                 )
 
     def _log(self, scalars: dict[str, float], seconds: float) -> None:
-        self.samples += self._rollout.part.total
+        self.samples += self._rollout.all_samples
         self.iteration += 1
         stats = {
             "samples": float(self.samples),
             "iteration": float(self.iteration),
-            "samples_per_second": self._rollout.part.total / seconds,
+            "samples_per_second": self._rollout.all_samples / seconds,
             **self._episodes.summary(self.ranks),
+            **(self._healed() if "healed" in self._rollout else {}),
             **scalars,
         }
         if self.logger is not None:
@@ -263,6 +278,10 @@ class Runner:
         for warning in self.watch.see(stats):
             for callback in self.on_warning:
                 callback(warning)
+
+    def _healed(self) -> dict[str, float]:
+        """How many steps of all ranks were left out because a world's simulation diverged."""
+        return {"episode/healed": float(self.ranks.sum(self._rollout["healed"].sum()))}
 
     def save(self) -> None:
         """Write all that the next iteration depends on to the checkpoint folder; all ranks must call it."""
@@ -294,7 +313,7 @@ class Runner:
         if missing:
             raise AgentError(f"{folder} has no {', '.join(missing)}: it is no run of this version; begin a new one")
         checkpoint.check_compatible(state["meta"], self.meta)
-        self.agent.load_state_dict(state["agent"])
+        self.agent.load_state_dict(_placed(state["agent"], self.generator.device))
         self.samples, self.iteration = state["samples"], state["iteration"]
         self.generator.set_state(state["generator"])
         self.watch.load_state_dict(state["watch"])
@@ -303,6 +322,13 @@ class Runner:
             worlds = parts[str(self.ranks.rank)]
             self.env.load_state_dict(worlds["env"])  # type: ignore
             self._episodes.load_state_dict(worlds["episodes"])
-            self._obs = worlds["obs"]
+            self._obs = _placed(worlds["obs"], self.generator.device)
         if self.logger is not None:
             self.logger.resume(self.samples)
+
+
+def _placed(state: Any, device: torch.device) -> Any:
+    """The tensors of a nested dict on the device."""
+    if isinstance(state, Mapping):
+        return {name: _placed(value, device) for name, value in state.items()}
+    return state.to(device) if isinstance(state, Tensor) else state

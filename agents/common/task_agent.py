@@ -101,7 +101,7 @@ class TaskAgent:
 
     def update(self, rollout: Rollout) -> dict[str, float]:
         """One iteration of PPO."""
-        seen = Rollout(*rollout.shape, rollout.ranks)
+        seen = rollout.alike()
         for name in ("action", "log_prob", "advantage", "return", *self._told):
             seen[name] = rollout[name]
         seen["state"] = self._input({name: rollout[name] for name in self._inputs})

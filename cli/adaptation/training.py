@@ -22,10 +22,12 @@ from murmillo.cli.adaptation.config import AdaptNetTrainConfig
 from murmillo.cli.adaptation.evaluating import evaluate
 from murmillo.cli.adaptation.metrics import TRAINING
 from murmillo.cli.adaptation.world import agent_meta, check_base, make_agent, make_env
+from murmillo.cli.devices import CPU
 from murmillo.cli.progress import Progress
 from murmillo.cli.tasks.training import complete, note_clips
 from murmillo.cli.training import follow, kept
 from murmillo.envs import HumanoidVectorEnv
+from murmillo.envs.devices import on
 
 
 def train(config: AdaptNetTrainConfig, suffix: str = "", ranks: Ranks = ALONE) -> int:
@@ -48,9 +50,9 @@ def train(config: AdaptNetTrainConfig, suffix: str = "", ranks: Ranks = ALONE) -
     if resuming:
         check_base(base, checkpoint.load(folder / runs.LAST))
     threads = launch.share_threads(config).threads
-    env = make_env(config, config.num_envs // ranks.size, threads=threads)
+    env = make_env(config, config.num_envs // ranks.size, threads=threads, training=True)
     try:
-        with kept(folder, config, resuming, ranks):
+        with kept(folder, config, resuming, ranks), on(env.device):
             return _train(config, base, env, folder, resuming, ranks)
     finally:
         env.close()
@@ -95,7 +97,8 @@ def _train(
     stopped = follow(runner, folder, opening, metrics=TRAINING, begin=begin)
     if not ranks.first:
         return 0
-    return complete(folder, runner.samples if stopped else None, measured, report.write, video=config.run.video)
+    with on(CPU):
+        return complete(folder, runner.samples if stopped else None, measured, report.write, video=config.run.video)
 
 
 def _warm_start(

@@ -12,15 +12,25 @@ from murmillo.agents.common.ranks import ALONE, Ranks
 from murmillo.cli import foundations, runs
 from murmillo.cli.adaptation.base import SETTING, BaseRun
 from murmillo.cli.adaptation.config import SCRATCH, AdaptNetTrainConfig, load
+from murmillo.cli.devices import for_playing, for_training
 from murmillo.cli.errors import CommandError
 from murmillo.envs import HumanoidVectorEnv
 
 
 def make_env(
-    config: AdaptNetTrainConfig, num_envs: int, render_mode: Literal["rgb_array"] | None = None, **changes: Any
+    config: AdaptNetTrainConfig,
+    num_envs: int,
+    render_mode: Literal["rgb_array"] | None = None,
+    *,
+    training: bool = False,
+    **changes: Any,
 ) -> HumanoidVectorEnv:
-    """N worlds of a run, with `changes` of their settings. Raises SuiteError where they cannot be."""
-    return HumanoidVectorEnv(num_envs, dataclasses.replace(config.env, **changes), config.make_task(), render_mode)
+    """N worlds of a run, with `changes` of their settings; for training on the device that those say.
+
+    Raises SuiteError where they cannot be.
+    """
+    settings = dataclasses.replace((for_training if training else for_playing)(config.env), **changes)
+    return HumanoidVectorEnv(num_envs, settings, config.make_task(), render_mode)
 
 
 def make_agent(
@@ -31,7 +41,7 @@ def make_agent(
     Raises:
         AgentError, CommandError: environment, settings and base do not fit together.
     """
-    generator = torch.Generator().manual_seed(config.seed)
+    generator = torch.Generator(env.device).manual_seed(config.seed)
     weights = None if base is None or config.choices["method"] == SCRATCH else base.weights(env.character)
     return AdaptNet(env, env.demonstrations, config.agent, generator, weights, ranks=ranks), generator
 

@@ -12,6 +12,7 @@ from murmillo.agents.common import checkpoint
 from murmillo.agents.common.interface import Steerable
 from murmillo.cli.agents import AGENTS, load_player, make_agent
 from murmillo.cli.config import TrainConfig
+from murmillo.cli.devices import for_playing
 from murmillo.cli.errors import CommandError
 from murmillo.cli.evaluation.chunks import ChunkStore
 from murmillo.cli.evaluation.commands import Commander
@@ -193,7 +194,7 @@ def open_bench(config: TrainConfig, folder: Path, request: Request) -> Iterator[
 def _environment(config: TrainConfig, motions: str, worlds: int) -> HumanoidVectorEnv:
     """Worlds that nothing ends; the ground alone counts as touched."""
     changed = {"motions": motions, "autoreset": "disabled", "episode_steps": _ENDLESS, "fall": FallConfig()}
-    return HumanoidVectorEnv(worlds, dataclasses.replace(config.env, **changed))
+    return HumanoidVectorEnv(worlds, dataclasses.replace(for_playing(config.env), **changed))
 
 
 def _abilities(config: TrainConfig, env: HumanoidVectorEnv) -> set[str]:

@@ -10,6 +10,7 @@ from murmillo.agents.common.logger import Logger
 from murmillo.agents.common.ranks import ALONE, Ranks
 from murmillo.agents.common.runner import Runner
 from murmillo.cli import launch, runs
+from murmillo.cli.devices import CPU
 from murmillo.cli.evaluation.identity import clip_digests
 from murmillo.cli.tasks import low, report, table
 from murmillo.cli.tasks.checks import check_settings
@@ -20,6 +21,7 @@ from murmillo.cli.tasks.metrics import training_metrics
 from murmillo.cli.tasks.world import World, make_policy, policy_meta
 from murmillo.cli.training import film, follow, kept
 from murmillo.envs import HumanoidVectorEnv
+from murmillo.envs.devices import on
 from murmillo.envs.motion.licences import terms_of
 
 
@@ -48,7 +50,7 @@ def train(config: TaskTrainConfig, suffix: str = "", ranks: Ranks = ALONE) -> in
     threads = launch.share_threads(config).threads
     world = World(config, below, config.num_envs // ranks.size, judged=True, threads=threads)
     try:
-        with kept(folder, config, resuming, ranks):
+        with kept(folder, config, resuming, ranks), on(world.env.device):
             return _train(config, below, world, folder, resuming, ranks)
     finally:
         world.close()
@@ -76,7 +78,8 @@ def _train(
 
     if not ranks.first:
         return 0
-    return complete(folder, runner.samples if stopped else None, measured, report.write, video=config.run.video)
+    with on(CPU):
+        return complete(folder, runner.samples if stopped else None, measured, report.write, video=config.run.video)
 
 
 def complete(

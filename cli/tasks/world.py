@@ -13,7 +13,9 @@ from murmillo.agents.case.high_level import HybridDecoder, hybrid_agent
 from murmillo.agents.common import checkpoint
 from murmillo.agents.common.latent_env import LatentEnv, Results
 from murmillo.agents.common.ranks import ALONE, Ranks
+from murmillo.agents.common.rollout import taken
 from murmillo.agents.common.task_agent import TaskAgent
+from murmillo.cli.devices import for_playing, for_training
 from murmillo.cli.tasks.config import TaskTrainConfig
 from murmillo.cli.tasks.low import LowRun
 from murmillo.cli.tasks.styles import style_reward, style_weights
@@ -48,14 +50,14 @@ class World:
             config: of the run.
             below: the run whose policy is followed; None where the policy acts itself.
             num_envs: N.
-            judged: give the low-level agent's reward terms too, as training needs them.
+            judged: for training: with the low-level agent's reward terms, and on the device of the settings.
             render_mode: of the environment.
             changes: of its settings.
 
         Raises:
             SuiteError, CommandError: something of it cannot be made.
         """
-        settings = dataclasses.replace(config.env, **changes)
+        settings = dataclasses.replace((for_training if judged else for_playing)(config.env), **changes)
         self.env = HumanoidVectorEnv(num_envs, settings, config.make_task(), render_mode)
         try:
             self.hybrid = config.choices["agent"] == "case" and not self.env.task.skill_steps
@@ -83,7 +85,7 @@ class World:
 
     def step(self, action: Tensor) -> Results:
         """One decision of actions `[N, A]`, with all that observe."""
-        results = self.decisions.step(action.numpy())
+        results = self.decisions.step(taken(self.decisions, action))
         if self.decisions is self.env:
             for call in self._observers:
                 call(action, results)  # type: ignore[arg-type] # which is what a vector environment gives
@@ -95,7 +97,7 @@ class World:
 
 def make_policy(config: TaskTrainConfig, world: World, ranks: Ranks = ALONE) -> tuple[TaskAgent, torch.Generator]:
     """The policy as it is before training, and the generator that it draws from: equal for equal arguments."""
-    generator = torch.Generator().manual_seed(config.seed)
+    generator = torch.Generator(world.env.device).manual_seed(config.seed)
     if world.hybrid:
         return hybrid_agent(world.decisions, config.agent, generator, ranks=ranks), generator
     return TaskAgent(world.decisions, config.agent, generator, ranks=ranks), generator

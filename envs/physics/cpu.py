@@ -19,6 +19,8 @@ _INTEGRATED = ("time", "qpos", "qvel", "qacc_warmstart", "ctrl", "xfrc_applied")
 class CpuPhysics:
     """`mujoco.batch.Batch` behind the `Physics` protocol. Results do not depend on the number of threads."""
 
+    device = torch.device("cpu")
+
     def __init__(self, scene: Scene, num_envs: int, threads: int = 0) -> None:
         """`threads` = 0 takes every CPU."""
         character, props = scene.character, len(scene.props)
@@ -89,6 +91,9 @@ class CpuPhysics:
         of_geoms = self._batch.expand("geom_friction")
         for geom in self._ground:
             of_geoms[env_ids.numpy(), geom, 0] = friction.numpy()
+
+    def close(self) -> None:
+        pass
 
     def state_dict(self) -> dict[str, Any]:
         state = {name: torch.from_numpy(self._batch.bind(name).copy()) for name in _INTEGRATED}

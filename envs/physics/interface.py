@@ -3,12 +3,13 @@
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+import torch
 from torch import Tensor
 
 
 @dataclass(frozen=True)
 class State:
-    """Live float64 views of N worlds, current after every `step` and `write`.
+    """Live views of N worlds, current after every `step` and `write`: float64 of MuJoCo, float32 of MuJoCo Warp.
 
     Read them and never write to them, but for the props' own state, which is their task's to set.
 
@@ -53,6 +54,8 @@ class Physics(Protocol):
 
     state: State
     num_envs: int
+    device: torch.device
+    """Where the state is."""
 
     def step(self, ctrl: Tensor, body_force_w: Tensor | None = None) -> None:
         """Advance every world by one control step.
@@ -79,6 +82,10 @@ class Physics(Protocol):
 
     def healed(self) -> Tensor:
         """[N] bool: worlds that the engine reset during the last step because their state had diverged."""
+        ...
+
+    def close(self) -> None:
+        """Let go of it. Raises SuiteError for what has gone wrong and was not yet said."""
         ...
 
     def state_dict(self) -> dict[str, Any]:

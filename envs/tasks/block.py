@@ -73,8 +73,9 @@ class Block(Task):
 
     def bind(self, num_envs: int, character: Character) -> None:
         super().bind(num_envs, character)
-        self._shield = character.bodies.index("shield")
-        self._others = [i for i in range(len(character.bodies)) if i != self._shield]
+        shield = character.bodies.index("shield")
+        self._shield = torch.tensor([shield])
+        self._others = torch.tensor([i for i in range(len(character.bodies)) if i != shield])
         self._aims = torch.tensor(character.body_ids(AIMS))
         self._clock = torch.zeros(num_envs, dtype=torch.int64)
         self._blocked = torch.zeros(num_envs, dtype=torch.bool)
@@ -82,11 +83,11 @@ class Block(Task):
         self._waiting_w = torch.zeros(num_envs, 3, dtype=torch.float64)
 
     def reset(self, env_ids: Tensor, state: State, generator: torch.Generator) -> None:
-        self._origin_w[env_ids] = state.qpos[env_ids, :2]
+        self._origin_w[env_ids] = state.qpos[env_ids, :2].double()
         self._begin_cycle(env_ids, state, generator)
 
     def advance(self, state: State, generator: torch.Generator) -> None:
-        self._blocked |= self._hit(state, [self._shield])
+        self._blocked |= self._hit(state, self._shield)
         self._clock += 1
         ended = (self._clock >= self.config.cycle).nonzero().squeeze(-1)
         if len(ended):
@@ -109,7 +110,8 @@ class Block(Task):
     def _throw(self, env_ids: Tensor, state: State, generator: torch.Generator) -> None:
         aim = self._aims[torch.randint(len(self._aims), (len(env_ids),), generator=generator)]
         start_w, target_w = state.prop_qpos[env_ids, 0, :3], state.body_pos_w[env_ids, aim]
-        state.prop_qvel[env_ids, 0, :3] = aimed(start_w, target_w, self.config.speed, generator)
+        velocity_w = aimed(start_w, target_w, self.config.speed, generator)
+        state.prop_qvel[env_ids, 0, :3] = velocity_w.to(state.prop_qvel)
 
     def goal(self, state: State) -> Tensor:
         phase = (self._clock.double() / self.config.cycle).unsqueeze(-1)
@@ -117,7 +119,7 @@ class Block(Task):
         return torch.cat((phase, home, seen(state, 0)), dim=-1).float()
 
     def reward(self, state: State) -> dict[str, Tensor]:
-        shielded = self._blocked | self._hit(state, [self._shield])
+        shielded = self._blocked | self._hit(state, self._shield)
         return {"block": (shielded & ~self._hit(state, self._others)).float()}
 
     def terminated(self, state: State) -> Tensor:
@@ -131,5 +133,5 @@ class Block(Task):
         for name, value in state.items():
             getattr(self, f"_{name}").copy_(value)
 
-    def _hit(self, state: State, bodies: list[int]) -> Tensor:
+    def _hit(self, state: State, bodies: Tensor) -> Tensor:
         return felt(state, 0, bodies, self.config.touch)

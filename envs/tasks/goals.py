@@ -136,7 +136,8 @@ def towards_target(state: State, target_w: Tensor) -> dict[str, Tensor]:
 def into_heading(state: State, vector_w: Tensor) -> Tensor:
     """The vectors [N, ..., 2 or 3] of world axes in the axes of each character's heading; z stays."""
     ahead = facing(state).reshape(-1, *[1] * (vector_w.ndim - 2), 2)
-    return turned(vector_w, ahead * ahead.new_tensor([1.0, -1.0]))
+    cosine, sine = ahead.unbind(-1)
+    return turned(vector_w, torch.stack((cosine, -sine), dim=-1))
 
 
 def turned(vector: Tensor, by: Tensor) -> Tensor:

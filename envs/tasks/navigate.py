@@ -124,11 +124,11 @@ class Navigate(GoalTask):
 
     def reset(self, env_ids: Tensor, state: State, generator: torch.Generator) -> None:
         super().reset(env_ids, state, generator)
-        self.goals["from_w"][env_ids] = state.qpos[env_ids, :2]
+        self.goals["from_w"][env_ids] = state.qpos[env_ids, :2].double()
 
     def advance(self, state: State, generator: torch.Generator) -> None:
         super().advance(state, generator)
-        self.goals["from_w"] = state.qpos[:, :2].clone()
+        self.goals["from_w"] = state.qpos[:, :2].clone().double()
 
     def command(self, env_ids: Tensor, **goals: Tensor) -> None:
         super().command(env_ids, **goals)

@@ -11,6 +11,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from murmillo.envs.devices import Placed
 from murmillo.envs.markers import Marker
 from murmillo.envs.physics import State
 from murmillo.envs.tasks.arguments import check_number, check_numbers, check_points, check_range, check_skill_steps
@@ -77,7 +78,7 @@ class PathFollow(GoalTask):
         check_skill_steps(config.skill_steps)
         self.skill_steps = int(config.skill_steps)
         self.goal_dim = 2 * len(config.lookahead) + 1
-        self._lookahead = torch.tensor(config.lookahead, dtype=torch.float64)
+        self._lookahead = Placed(torch.tensor(config.lookahead, dtype=torch.float64))
         self._given: Paths | None = None
         if config.points is not None:
             check_points("points", config.points)
@@ -116,7 +117,7 @@ class PathFollow(GoalTask):
     def markers(self, state: State, world: int) -> list[Marker]:
         arc = self.goals["arc"] + torch.arange(_SHOWN).unsqueeze(-1)
         shown = self._paths.at(arc.T)[world].tolist()
-        target = self._paths.at(arc.T[:, :1] + self._lookahead[:1])[world, 0].tolist()
+        target = self._paths.at(arc.T[:, :1] + self._lookahead.like(arc)[:1])[world, 0].tolist()
         return [*(Marker([*place, 0.05], size=0.05, rgba=BLUE) for place in shown), Marker([*target, 0.1], size=0.1)]
 
     @property
@@ -126,13 +127,14 @@ class PathFollow(GoalTask):
     def _draw_paths(self, n: int, generator: torch.Generator) -> Paths:
         """Paths from the origin along x: the one that was given, or random ones."""
         if self._given is not None:
-            return Paths(self._given.points.expand(n, -1, -1), self._given.spacing)
+            points = self._given.points.to(generator.device)
+            return Paths(points.expand(n, -1, -1), self._given.spacing)
         config = self.config
         return random_paths(n, config.length, config.bend_radius, config.bend_length, generator)
 
     def _to_points_ahead(self, state: State) -> Tensor:
         """[N, K, 2] from the root to the points ahead that the policy saw last, world axes [m]."""
-        arc = self.goals["arc"].unsqueeze(-1) + self._lookahead
+        arc = self.goals["arc"].unsqueeze(-1) + self._lookahead.like(self.goals["arc"])
         return self._paths.at(arc) - state.qpos[:, None, :2]
 
     def _nearest(self, state: State) -> tuple[Tensor, Tensor]:

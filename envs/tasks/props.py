@@ -3,12 +3,13 @@
 import torch
 from torch import Tensor
 
+from murmillo.envs.devices import Placed
 from murmillo.envs.physics import State
 from murmillo.envs.rotations import heading_quat, quat_conj, quat_mul, quat_rotate, tan_norm
 from murmillo.envs.tasks.goals import uniform
 
 GRAVITY = 9.81
-UPRIGHT = torch.tensor([1.0, 0.0, 0.0, 0.0], dtype=torch.float64)
+_UPRIGHT = Placed(torch.tensor([1.0, 0.0, 0.0, 0.0], dtype=torch.float64))
 
 
 def seen(state: State, prop: int) -> Tensor:
@@ -24,7 +25,7 @@ def seen(state: State, prop: int) -> Tensor:
     return torch.cat((place, tan_norm(quat), linear, spin), dim=-1)
 
 
-def felt(state: State, prop: int, bodies: list[int], touch: float) -> Tensor:
+def felt(state: State, prop: int, bodies: Tensor, touch: float) -> Tensor:
     """[N] bool: the prop pressed on one of these bodies with more than `touch` along an axis [N]."""
     return (state.hit_force_w[:, prop].abs().amax(-1) > touch)[:, bodies].any(-1)
 
@@ -35,10 +36,11 @@ def around(centre_w: Tensor, distance: Tensor, generator: torch.Generator) -> Te
     return centre_w[:, :2] + distance.unsqueeze(-1) * torch.stack((angle.cos(), angle.sin()), dim=-1)
 
 
-def put(state: State, env_ids: Tensor, prop: Tensor | int, pos_w: Tensor, quat_w: Tensor = UPRIGHT) -> None:
-    """Place a prop [n] of these worlds [n] at pos_w [n, 3] with rotation quat_w [n, 4], at rest."""
-    state.prop_qpos[env_ids, prop, :3] = pos_w
-    state.prop_qpos[env_ids, prop, 3:] = quat_w
+def put(state: State, env_ids: Tensor, prop: Tensor | int, pos_w: Tensor, quat_w: Tensor | None = None) -> None:
+    """Place a prop [n] of these worlds [n] at pos_w [n, 3] with rotation quat_w [n, 4], else upright, at rest."""
+    pose = state.prop_qpos
+    pose[env_ids, prop, :3] = pos_w.to(pose)
+    pose[env_ids, prop, 3:] = _UPRIGHT.like(pose) if quat_w is None else quat_w.to(pose)
     state.prop_qvel[env_ids, prop] = 0.0
 
 

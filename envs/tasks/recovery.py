@@ -139,4 +139,5 @@ class Recovery(Task):
         start_w[:, :2] = around(target_w, uniform(len(env_ids), self.config.distance, generator), generator)
         put(state, env_ids, box, start_w)
         self._waiting[env_ids, box] = False
-        state.prop_qvel[env_ids, box, :3] = aimed(start_w, target_w, self.config.speed, generator)
+        velocity_w = aimed(start_w, target_w, self.config.speed, generator)
+        state.prop_qvel[env_ids, box, :3] = velocity_w.to(state.prop_qvel)

@@ -9,6 +9,7 @@ import torch
 from torch import Tensor
 
 from murmillo.envs.character import Character
+from murmillo.envs.devices import Placed
 from murmillo.envs.markers import Marker
 from murmillo.envs.physics import State
 from murmillo.envs.rotations import quat_rotate
@@ -20,7 +21,7 @@ from murmillo.envs.tasks.props import around, felt, put, seen
 
 SIZE = (0.4, 0.4, 1.8)
 MASS = 8.6
-_UP = torch.tensor([0.0, 0.0, 1.0], dtype=torch.float64)
+_UP = Placed(torch.tensor([0.0, 0.0, 1.0], dtype=torch.float64))
 
 
 @dataclass
@@ -80,7 +81,7 @@ class Strike(Task):
         super().bind(num_envs, character)
         arm = ("right_hand", "right_lower_arm") if self.config.form == "code" else ()
         may = character.bodies if self.config.any_body else ("sword", *arm, *character.feet)
-        self._forbidden = character.body_ids(tuple(body for body in character.bodies if body not in may))
+        self._forbidden = torch.tensor([i for i, body in enumerate(character.bodies) if body not in may])
 
     def reset(self, env_ids: Tensor, state: State, generator: torch.Generator) -> None:
         n, config = len(env_ids), self.config
@@ -127,4 +128,4 @@ class Strike(Task):
 
     def _upright(self, state: State) -> Tensor:
         """[N] cosine between the target's own up and the world's."""
-        return quat_rotate(state.prop_qpos[:, 0, 3:7], _UP.expand(self.num_envs, 3))[:, 2]
+        return quat_rotate(state.prop_qpos[:, 0, 3:7], _UP.like(state.prop_qpos).expand(self.num_envs, 3))[:, 2]

@@ -10,6 +10,8 @@ from murmillo.agents.common import checkpoint
 from murmillo.agents.common.adapter import AdaptedPolicy, AdapterConfig
 from murmillo.agents.common.advantages import gae, normalise_advantage, weigh_advantages
 from murmillo.agents.common.errors import AgentError
+from murmillo.agents.common.ppo import Minibatch
+from murmillo.agents.common.ranks import ALONE, Part
 from murmillo.agents.common.rollout import Rollout
 from murmillo.agents.common.runner import Runner
 from tests.agents.toy import equal
@@ -130,7 +132,8 @@ def test_penalties_by_hand(generator: torch.Generator) -> None:
     with torch.no_grad():
         adapter.embed.bias[:2] = torch.tensor([3.0, 4.0])
         adapter.adaptors[0].bias[:3] = 2.0  # type: ignore[index]
-    batch = {"state": torch.zeros(6, 4, 8), "length": torch.ones(6).long(), "goal": torch.zeros(6, 2)}
+    rows = {"state": torch.zeros(6, 4, 8), "length": torch.ones(6).long(), "goal": torch.zeros(6, 2)}
+    batch = Minibatch(rows, Part(ALONE, 6))
     agent._tell(batch)
     penalties = agent._regularise(batch, torch.zeros(6, 4))
     assert penalties["injection"].item() == pytest.approx(0.5 * 5)

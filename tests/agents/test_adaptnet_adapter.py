@@ -10,6 +10,7 @@ from murmillo.agents.adaptnet.agent import AdaptNet
 from murmillo.agents.adaptnet.base import Base
 from murmillo.agents.common.adapter import INJECTION, AdaptedPolicy, Adapter, AdapterConfig, affine
 from murmillo.agents.common.errors import AgentError
+from murmillo.agents.common.exploration import ActionNoise
 from murmillo.agents.common.interface import Obs
 from murmillo.agents.common.networks import GaussianPolicy
 from murmillo.agents.common.rollout import tensors
@@ -65,12 +66,11 @@ def test_before_training_it_acts_as_its_base_to_the_last_bit(name: str, heights:
     before.model.policy.load_state_dict(base.policy)
     before.model.state_normalizer.load_state_dict(base.normalizer)
     after = make_adaptnet(env, torch.Generator().manual_seed(2), base, adapter=CONFIGS[name])
-    after.generator = before.generator = torch.Generator()
     obs = observe(env)
     for deterministic in (True, False):
         steps = []
         for agent in (before, after):
-            agent.generator.manual_seed(7)
+            agent.noise.generator = torch.Generator().manual_seed(7)
             steps.append(agent.act(obs, deterministic=deterministic))
         assert torch.equal(steps[0].action, steps[1].action)
         assert torch.equal(steps[0].log_prob, steps[1].log_prob)
@@ -225,9 +225,8 @@ def test_the_policies_of_the_other_methods_are_adapted_alike(generator: torch.Ge
     policy = AdaptedPolicy(base, Adapter(base, AdapterConfig(), generator))
     views = torch.cat([state, state], -1)
     assert torch.equal(policy(views, latent), before)
-    assert torch.equal(
-        policy.sample(before, torch.Generator().manual_seed(1)), base.sample(before, torch.Generator().manual_seed(1))
-    )
+    noise, same_noise = (ActionNoise(torch.Generator().manual_seed(1)) for _ in range(2))
+    assert torch.equal(policy.sample(before, noise), base.sample(before, same_noise))
     optimizer = torch.optim.Adam([p for p in policy.parameters() if p.requires_grad], lr=1e-2)
     target = before.detach() + 1
     for _ in range(100):

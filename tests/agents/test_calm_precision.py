@@ -40,8 +40,8 @@ def test_references_encode_motions_of_their_style(generator: torch.Generator) ->
     agent = make_calm(env, generator)
     asked = []
 
-    def demonstrations(n: int, generator: torch.Generator, skill: Any = None, frames: Any = None) -> dict:
-        drawn = env.demonstrations(n, generator, skill, frames)
+    def demonstrations(*args: Any, **kwargs: Any) -> dict[str, torch.Tensor]:
+        drawn = env.demonstrations(*args, **kwargs)
         asked.append(drawn["window"].shape)
         return drawn
 

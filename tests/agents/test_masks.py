@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 import torch
@@ -25,12 +26,17 @@ class Masked:
         self.made_up, self.everywhere = made_up, everywhere
 
     def __call__(
-        self, n: int, generator: torch.Generator, skill: Tensor | None = None, frames: int | None = None
+        self,
+        n: int,
+        generator: torch.Generator,
+        skill: Tensor | None = None,
+        frames: int | None = None,
+        rows: Tensor | slice | None = None,
     ) -> dict[str, Tensor]:
-        drawn = self.whole(n, generator, skill, frames)
-        rows = drawn["skill"] == 0 if self.skills > 1 else drawn["window"][:, -1, 2] > 0
-        mask = torch.zeros(n, 4, dtype=torch.bool)
-        mask[rows | self.everywhere, LEFT_OUT] = True
+        drawn = self.whole(n, generator, skill, frames, rows)
+        hidden = drawn["skill"] == 0 if self.skills > 1 else drawn["window"][:, -1, 2] > 0
+        mask = torch.zeros(len(hidden), 4, dtype=torch.bool)
+        mask[hidden | self.everywhere, LEFT_OUT] = True
         return {**drawn, "window": drawn["window"].masked_fill(mask[:, None], self.made_up), "mask": mask}
 
 
@@ -102,12 +108,10 @@ def test_case_leaves_out_of_its_own_windows_what_the_clips_of_the_label_do(gener
 def test_a_mask_that_few_clips_of_a_label_have_is_not_missed(generator: torch.Generator) -> None:
     env = PointMass(1, skills=2)
 
-    def one_in_twenty(
-        n: int, generator: torch.Generator, skill: Tensor | None = None, frames: int | None = None
-    ) -> dict[str, Tensor]:
+    def one_in_twenty(n: int, generator: torch.Generator, *args: Any, **kwargs: Any) -> dict[str, Tensor]:
         mask = torch.zeros(n, 4, dtype=torch.bool)
         mask[:, LEFT_OUT] = torch.rand(n, generator=generator) < 0.05
-        return {**env.demonstrations(n, generator, skill, frames), "mask": mask}
+        return {**env.demonstrations(n, generator, *args, **kwargs), "mask": mask}
 
     drawn = FeatureMasks(one_in_twenty, skills=2).draw(20_000, generator, torch.arange(20_000) % 2)
     assert drawn is not None
@@ -118,10 +122,8 @@ def test_a_mask_that_few_clips_of_a_label_have_is_not_missed(generator: torch.Ge
 def test_where_nothing_is_left_out_nothing_is_drawn(generator: torch.Generator) -> None:
     env = PointMass(1, skills=2)
 
-    def all_whole(
-        n: int, generator: torch.Generator, skill: Tensor | None = None, frames: int | None = None
-    ) -> dict[str, Tensor]:
-        return {**env.demonstrations(n, generator, skill, frames), "mask": torch.zeros(n, 4, dtype=torch.bool)}
+    def all_whole(n: int, *args: Any, **kwargs: Any) -> dict[str, Tensor]:
+        return {**env.demonstrations(n, *args, **kwargs), "mask": torch.zeros(n, 4, dtype=torch.bool)}
 
     state = generator.get_state()
     for demonstrations in (env.demonstrations, all_whole):

@@ -10,6 +10,7 @@ from murmillo.agents.common import checkpoint
 from murmillo.agents.common.episodes import EpisodeStatistics
 from murmillo.agents.common.errors import AgentError
 from murmillo.agents.common.logger import Logger
+from murmillo.agents.common.rollout import taken
 from tests.agents.toy import PointMass, equal, make_runner
 
 ITERATION = 32 * 8
@@ -174,3 +175,28 @@ def test_episode_statistics_by_hand() -> None:
     assert episodes.summary() == {"episode/length": 2.0, "episode/fall_rate": pytest.approx(2 / 3)}  # 2, 1 and 3 steps
     assert episodes.length.tolist() == [0, 0, 3]
     assert episodes.summary()["episode/length"] != episodes.summary()["episode/length"]  # NaN: none ended
+
+
+def test_nothing_is_learned_from_steps_of_diverged_worlds(tmp_path: Path) -> None:
+    runner = make_runner(tmp_path)
+    whole = runner._collect()
+    runner._reward(whole)
+    healed = torch.zeros(whole.shape, dtype=torch.bool)
+    healed[3, 1] = healed[7, 0] = True
+    whole["healed"] = healed
+    whole["terminated"] = whole["terminated"] | healed
+    runner._advantage(whole)
+    value = runner.agent.value({"state": whole["state"]}, {"latent": whole["latent"]})
+    torch.testing.assert_close(whole["return"][healed], value[healed])  # what comes before ends in the expected return
+    kept = ~healed.flatten()
+    assert torch.equal(whole.flat("action"), whole["action"].flatten(0, 1)[kept])
+    rows = torch.cat([rows for rows, _ in whole.minibatches(7, torch.Generator().manual_seed(0))])
+    assert rows.sort().values.tolist() == list(range(whole.samples - 2))
+    runner.agent.update(whole)
+
+
+def test_tensors_stay_tensors_where_the_environment_takes_them() -> None:
+    action, env = torch.zeros(8, 2), PointMass(8)
+    assert isinstance(taken(env, action), np.ndarray)
+    env.tensors = True  # type: ignore[attr-defined]
+    assert taken(env, action) is action

@@ -102,7 +102,12 @@ class PointMass(VectorEnv):
         return {"state": window[:, -1], "skill": self.skill.copy(), "window": window}
 
     def demonstrations(
-        self, n: int, generator: torch.Generator, skill: Tensor | None = None, frames: int | None = None
+        self,
+        n: int,
+        generator: torch.Generator,
+        skill: Tensor | None = None,
+        frames: int | None = None,
+        rows: Tensor | slice | None = None,
     ) -> dict[str, Tensor]:
         if skill is None:
             skill = torch.randint(self.skills, (n,), generator=generator) if self.skills > 1 else torch.zeros(n).long()
@@ -112,7 +117,8 @@ class PointMass(VectorEnv):
         times = DT * torch.arange(frames or self.window)
         position = start[:, None] + times[None, :, None] * velocity[:, None]
         window = torch.cat([position, velocity[:, None].expand_as(position)], 2)
-        return {"window": window, "skill": skill}
+        drawn = {"window": window, "skill": skill}
+        return drawn if rows is None else {name: value[rows] for name, value in drawn.items()}
 
     def imitation_pairs(self, n: int, generator: torch.Generator) -> dict[str, Tensor]:
         state = self.demonstrations(n, generator)["window"][:, -1]

@@ -58,9 +58,14 @@ class Wanderer(Heading):
         return seen
 
     def demonstrations(
-        self, n: int, generator: torch.Generator, skill: Tensor | None = None, frames: int | None = None
+        self,
+        n: int,
+        generator: torch.Generator,
+        skill: Tensor | None = None,
+        frames: int | None = None,
+        rows: Tensor | slice | None = None,
     ) -> dict[str, Tensor]:
-        drawn = super().demonstrations(n, generator, skill, frames or 3)
+        drawn = super().demonstrations(n, generator, skill, frames or 3, rows)
         return {**drawn, "window": drawn["window"][..., 2:]}
 
 

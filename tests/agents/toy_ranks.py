@@ -39,12 +39,6 @@ class Numbered(PointMass):
         self.skill[worlds] = np.searchsorted(below, drawn[:, 2]).clip(max=self.skills - 1)
         self.episode[worlds] += 1
 
-    def demonstrations(  # type: ignore[override]  # a run of ranks asks for rows
-        self, n: int, generator: torch.Generator, skill: Any = None, frames: Any = None, rows: Any = None
-    ) -> dict[str, Tensor]:
-        drawn = super().demonstrations(n, generator, skill, frames)
-        return drawn if rows is None else {name: value[rows] for name, value in drawn.items()}
-
     def state_dict(self) -> dict[str, Tensor]:
         return {**super().state_dict(), "episode": torch.from_numpy(self.episode.copy())}
 

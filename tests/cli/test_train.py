@@ -111,3 +111,19 @@ def test_record_without_opengl(murmillo: Murmillo, own_run: Path, monkeypatch: p
     assert err.count("\n") == 1
     assert "OpenGL" in err
     assert not (own_run / "video.mp4").exists()
+
+
+def test_a_run_on_warp_learns_and_is_played_on_the_cpu(
+    murmillo: Murmillo, tiny: tuple[str, ...], folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    warp = pytest.importorskip("warp", reason="physics=warp needs the extra gpu: pip install 'murmillo[gpu]'")
+    monkeypatch.setattr(warp.config, "optimization_level", 1)  # as in tests/envs/test_warp.py, whose kernels it takes
+    engine = ("physics=warp", "device=cpu", "env.contacts=48", "env.constraints=160")
+    status, _, err = murmillo("train", *tiny, *engine, "run.name=warp")
+    assert status == 0, err
+    kept = rows(folder / "runs" / "warp")
+    assert [row["samples"] for row in kept] == ["64", "128"]
+    assert [row["episode/healed"] for row in kept] == ["0.0", "0.0"]
+    status, _, err = murmillo("train", "run.resume=runs/warp", "runner.samples=192")
+    assert status == 0, err
+    assert [row["samples"] for row in rows(folder / "runs" / "warp")] == ["64", "128", "192"]

@@ -1,0 +1,19 @@
+"""On what a run learns, and on what everybody else looks at it."""
+
+import dataclasses
+
+import torch
+
+from murmillo.envs import EnvConfig
+
+CPU = torch.device("cpu")
+
+
+def for_training(env: EnvConfig) -> EnvConfig:
+    """The environment's settings with tensors in place of arrays, which then need not leave the device."""
+    return dataclasses.replace(env, tensors=True)
+
+
+def for_playing(env: EnvConfig) -> EnvConfig:
+    """Those of all commands but training: MuJoCo on the CPU, so that any machine plays what another has trained."""
+    return dataclasses.replace(env, physics="cpu", device="auto", tensors=False, contacts=0, constraints=0)
