@@ -32,7 +32,7 @@ def test_worlds(benchmark: Any, effort: Effort, record: Record, engine: str) -> 
     if (reason := why_not(engine)) is not None:
         record.left_out |= dict.fromkeys(compared.values(), reason)
         pytest.skip(reason)
-    config = env_config(window=10, **({} if engine == "cpu" else {"physics": engine}))
+    config = env_config(window=10, **({} if engine == "cpu" else {"physics": engine, "tensors": True}))
     state = warm_state(config)
     with ExitStack() as stack:
         contestants = [

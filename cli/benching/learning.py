@@ -17,7 +17,10 @@ from murmillo.cli.adaptation.config import AdaptNetTrainConfig
 from murmillo.cli.adaptation.words import are_about_adaptnet
 from murmillo.cli.benching.turns import Rates
 from murmillo.cli.config import TrainConfig
+from murmillo.cli.devices import for_training
+from murmillo.cli.training import MATMUL
 from murmillo.envs import HumanoidVectorEnv
+from murmillo.envs.devices import on
 
 ROLLOUT = "rollout"
 UPDATE = "learner update"
@@ -94,10 +97,15 @@ class Learning:
 
     def warm_up(self) -> None:
         """One rollout: the first touches memory that the others find ready."""
-        self._runner._direct()
-        self._runner._collect()
+        with on(self.env.device):
+            self._runner._direct()
+            self._runner._collect()
 
     def turn(self) -> Rates:
+        with on(self.env.device):
+            return self._iterate()
+
+    def _iterate(self) -> Rates:
         runner = self._runner
         begin = self._now()
         runner._direct()
@@ -122,7 +130,10 @@ class Learning:
 
 def _make(config: TrainConfig | AdaptNetTrainConfig) -> tuple[HumanoidVectorEnv, Any, torch.Generator]:
     if isinstance(config, AdaptNetTrainConfig):
-        env = world.make_env(config, config.num_envs)
-        return env, *world.make_agent(config, None, env)
-    env = HumanoidVectorEnv(config.num_envs, config.env)
-    return env, *agents.make_agent(config.choices["agent"], config.agent, env, config.seed)
+        env = world.make_env(config, config.num_envs, training=True)
+        with on(env.device):
+            return env, *world.make_agent(config, None, env)
+    torch.set_float32_matmul_precision(MATMUL[config.matmul])
+    env = HumanoidVectorEnv(config.num_envs, for_training(config.env))
+    with on(env.device):
+        return env, *agents.make_agent(config.choices["agent"], config.agent, env, config.seed)

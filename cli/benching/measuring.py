@@ -14,6 +14,7 @@ from murmillo.cli.benching.memory import peak_memory
 from murmillo.cli.benching.stepping import ENVIRONMENT, PHYSICS, Stepping, make_warm, physics_of, warm_state
 from murmillo.cli.benching.turns import Contestant, Rates, one_round, rate_of
 from murmillo.cli.config import TrainConfig
+from murmillo.cli.devices import for_training
 from murmillo.envs.tasks import Task
 
 WORLDS = (64, 256, 1024, 4096)
@@ -136,7 +137,7 @@ def _step(
     """Rates of physics and environment in turns, by numbers of worlds and threads."""
     contestants = []
     for worlds, threads in cases:
-        env = make_warm(worlds, dataclasses.replace(config.env, threads=threads), _task(config), state)
+        env = make_warm(worlds, dataclasses.replace(for_training(config.env), threads=threads), _task(config), state)
         contestants.append(Stepping(env, max(1, _SAMPLES_A_TURN // worlds), f", {worlds} worlds, {threads} threads"))
     rounds = _rounds(contestants, seconds)
     found = {

@@ -10,6 +10,7 @@ import numpy as np
 import torch
 
 from murmillo.cli.benching.turns import Rates
+from murmillo.cli.versions import usable_cores
 from murmillo.envs import EnvConfig, HumanoidVectorEnv
 from murmillo.envs.tasks import Task
 
@@ -105,13 +106,15 @@ class Stepping:
         env.physics.step = self._timed  # type: ignore[method-assign]
 
     def turn(self) -> Rates:
+        torch.set_num_threads(self.env.config.threads or usable_cores())  # as a training with so many has it
         seconds = self._physics_seconds = 0.0
         for _ in range(self.steps):
             action = noise(self.env, self._count)
             self._count += 1
             self.before_step(action)
+            given = torch.as_tensor(action, device=self.env.device) if self.env.config.tensors else action
             begin = self._now()
-            self.env.step(action)
+            self.env.step(given)
             seconds += self._now() - begin
         samples = self.env.num_envs * self.steps
         return {

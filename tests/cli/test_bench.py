@@ -3,7 +3,7 @@
 import json
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import mujoco
@@ -21,12 +21,15 @@ Murmillo = Callable[..., tuple[int, str, str]]
 
 
 @pytest.fixture
-def small(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Few worlds and few steps, so that a measurement takes a moment."""
+def small(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Few worlds and few steps, so that a measurement takes a moment; torch gets its threads back."""
+    threads = torch.get_num_threads()
     monkeypatch.setattr(stepping, "_WARMED", 3)
     monkeypatch.setattr(stepping, "WARM_UP", 2)
     monkeypatch.setattr(measuring, "WORLDS", (2, 5))
     monkeypatch.setattr(measuring, "_SAMPLES_A_TURN", 8)
+    yield
+    torch.set_num_threads(threads)
 
 
 @pytest.mark.usefixtures("small")
