@@ -2,12 +2,13 @@
 PYTHON ?= python3
 BIN := .venv/bin
 INSTALLED := .venv/.installed
+BENCH := $(BIN)/python -m pytest benchmarks --benchmark-only
 
 .DEFAULT_GOAL := help
-.PHONY: help train test lint type bench wheel clean
+.PHONY: help train test lint type bench bench-compare bench-baseline wheel clean
 
 help:  ## list the verbs
-	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "make %-8s %s\n", $$1, $$2}' Makefile
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "make %-14s %s\n", $$1, $$2}' Makefile
 
 $(INSTALLED): pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv .venv
@@ -27,8 +28,16 @@ lint: $(INSTALLED)  ## ruff and the import contracts
 type: $(INSTALLED)  ## pyright
 	$(BIN)/pyright
 
-bench: $(INSTALLED)  ## run the benchmarks side by side
-	$(BIN)/python -m pytest benchmarks --benchmark-only $(ARGS)
+bench: $(INSTALLED)  ## run the benchmarks, a quarter of an hour; ARGS="-k environments" some of them
+	$(BENCH) $(ARGS)
+
+bench-compare: $(INSTALLED)  ## run what the gate needs, and fail where a ratio has fallen by more than 15 %
+	$(BENCH) -m gate $(ARGS)
+	$(BIN)/python -m benchmarks.gate compare
+
+bench-baseline: $(INSTALLED)  ## run the same on an idle machine, and keep its ratios as the baseline
+	$(BENCH) -m gate $(ARGS)
+	$(BIN)/python -m benchmarks.gate baseline
 
 wheel: $(INSTALLED)  ## build dist/*.whl
 	rm -rf build dist

@@ -1,74 +1,61 @@
-"""Prints the figures of a run as a table, and keeps them."""
+"""What the benchmarks share: how long they try, and the record that they write."""
 
-import json
 import os
-import platform
-from collections.abc import Callable
-from dataclasses import asdict, dataclass
-from importlib.metadata import version
-from pathlib import Path
+from dataclasses import dataclass
 from typing import Any
 
 import pytest
 
-BARE = "bare mj_step, all cores"
+from benchmarks.record import FOLDER, MARKDOWN, Record
+from murmillo.cli.benching.turns import Contestant, Rates, one_round
+
+_RECORD = pytest.StashKey[Record]()
+
+
+def pytest_addoption(parser: Any) -> None:
+    parser.addoption("--quick", action="store_true", help="try the benchmarks themselves: few worlds, two rounds")
+
+
+def pytest_configure(config: Any) -> None:
+    config.addinivalue_line("markers", "gate: its ratios are kept in baseline.json")
+    config.stash[_RECORD] = Record(os.getloadavg()[0], bool(config.getoption("--quick")))
+
+
+def pytest_terminal_summary(terminalreporter: Any, config: Any) -> None:
+    record = config.stash[_RECORD]
+    if record.figures or record.ratios:
+        record.save(FOLDER)
+        terminalreporter.section(str(FOLDER / MARKDOWN))
+        terminalreporter.write_line(record.markdown())
 
 
 @dataclass(frozen=True)
-class Figure:
-    """What was measured.
+class Effort:
+    """How much is done: all of it, or a trial of the benchmarks themselves."""
 
-    Attributes:
-        name: of what was run.
-        rate: control steps (or samples) a second.
-        note: under which conditions.
-        of_bare: rate over that of bare `mj_step` in the same round: median and range.
-        ours_over_it: rate of our environment over this one in the same round: median and range.
-        of_ase: rate over ASE's in the same round: median and range.
-    """
+    quick: bool
 
-    name: str
-    rate: float
-    note: str = ""
-    of_bare: str = ""
-    ours_over_it: str = ""
-    of_ase: str = ""
+    def worlds(self, wanted: int) -> int:
+        return min(wanted, 64) if self.quick else wanted
 
+    def rounds(self, wanted: int) -> int:
+        return min(wanted, 2) if self.quick else wanted
 
-FIGURES: list[Figure] = []
+    def run(self, benchmark: Any, contestants: list[Contestant], rounds: int, warm_up: int = 1) -> list[Rates]:
+        """Rounds of turns; those that warm up are forgotten."""
+        done: list[Rates] = []
+        rounds = self.rounds(rounds)
+        benchmark.pedantic(lambda: done.append(one_round(contestants)), rounds=rounds, warmup_rounds=warm_up)
+        benchmark.extra_info["rounds"] = done
+        return done[warm_up:]
 
 
 @pytest.fixture
-def record(benchmark: Any) -> Callable[[Figure], None]:
-    """`record(figure)` keeps a figure for the table and for pytest-benchmark's JSON."""
-
-    def keep(figure: Figure) -> None:
-        benchmark.extra_info[figure.name] = asdict(figure)
-        FIGURES.append(figure)
-
-    return keep
+def effort(pytestconfig: pytest.Config) -> Effort:
+    return Effort(bool(pytestconfig.getoption("--quick")))
 
 
-def pytest_terminal_summary(terminalreporter: Any) -> None:
-    if not FIGURES:
-        return
-    table = markdown(FIGURES)
-    terminalreporter.section("control steps a second")
-    terminalreporter.write_line(table)
-    folder = Path(os.environ.get("MURMILLO_BENCH", "benchmarks/results"))
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / "throughput.md").write_text(table + "\n", encoding="utf-8")
-    (folder / "throughput.json").write_text(json.dumps([asdict(f) for f in FIGURES], indent=1) + "\n", encoding="utf-8")
-
-
-def markdown(figures: list[Figure]) -> str:
-    """The figures as a table, with the machine and the versions."""
-    packages = ", ".join(f"{name} {version(name)}" for name in ("mujoco", "torch", "gymnasium", "numpy"))
-    lines = [
-        f"{platform.machine()}, {os.cpu_count()} CPUs, Python {platform.python_version()}, {packages}",
-        "",
-        "| what | a second | of bare `mj_step` | ours over it | of ASE's | note |",
-        "|---|---:|---:|---:|---:|---|",
-    ]
-    lines += [f"| {f.name} | {f.rate:,.0f} | {f.of_bare} | {f.ours_over_it} | {f.of_ase} | {f.note} |" for f in figures]
-    return "\n".join(lines)
+@pytest.fixture
+def record(pytestconfig: pytest.Config) -> Record:
+    """Figures and ratios for the tables of this run."""
+    return pytestconfig.stash[_RECORD]

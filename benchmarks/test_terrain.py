@@ -1,68 +1,61 @@
 """What uneven ground costs: beside flat ground in turns, and the share of a step that looking at the ground takes."""
 
 import time
-from collections.abc import Callable
 from statistics import median
 from typing import Any
 
-import numpy as np
+import pytest
 
-from benchmarks.conftest import Figure
-from benchmarks.workload import NOISE
+from benchmarks.conftest import Effort
+from benchmarks.record import Figure, Record
+from murmillo.cli.benching.stepping import ENVIRONMENT, Stepping, make_warm, physics_of
+from murmillo.cli.benching.turns import Rates, rate_of, ratio_of
 from murmillo.envs import HumanoidVectorEnv
-from murmillo.envs.registration import make_vector
+from murmillo.envs.registration import env_config, make_task
 
 WORLDS = 512
-ROUNDS = 30
+GROUNDS = ("flat", "rough")
 MOST = 0.15
 """The share of a step that sampling the heights may take."""
+_SHARE = "looking at the ground / step"
 
 
-def test_looking_at_the_ground(benchmark: Any, record: Callable[[Figure], None]) -> None:
-    """A step on rough ground and one on flat ground in turn, under the same noise."""
-    envs = {kind: _make(kind) for kind in ("flat", "rough")}
-    looks = _timed_looks(envs["rough"])
-    rounds: list[dict[str, float]] = []
-    random = np.random.default_rng(0)
+class Looking(Stepping):
+    """Steps on the ground of one kind, and the share of them that goes into looking at it."""
 
-    def one() -> None:
-        action = random.uniform(-NOISE, NOISE, (WORLDS, 28)).astype(np.float32)
-        looks.clear()
-        seconds = {}
-        for kind, env in envs.items():
-            begin = time.perf_counter()
-            env.step(action)
-            seconds[kind] = time.perf_counter() - begin
-        rounds.append(seconds | {"looking": sum(looks)})
+    def __init__(self, env: HumanoidVectorEnv, label: str) -> None:
+        super().__init__(env, steps=2, label=label)
+        self._seconds = 0.0
+        self._look = env._observer._look
+        env._observer._look = self._timed_look  # type: ignore[method-assign]
 
-    benchmark.pedantic(one, rounds=ROUNDS, iterations=1, warmup_rounds=3)
-    measured = rounds[3:]
-    share = sorted(turn["looking"] / turn["rough"] for turn in measured)
-    of_flat = sorted(turn["flat"] / turn["rough"] for turn in measured)
-    notes = {"flat": f"{WORLDS} worlds", "rough": f"{WORLDS} worlds; {median(of_flat):.2f} of flat ground's rate"}
-    for kind, note in notes.items():
-        rate = WORLDS / median(turn[kind] for turn in measured)
-        record(Figure(f"environment step, Navigate, {kind} ground", rate, note))
-    note = f"share of the step: {median(share):.3f} ({share[0]:.3f}-{share[-1]:.3f})"
-    record(Figure("height maps", WORLDS / median(turn["looking"] for turn in measured), note))
-    assert median(share) <= MOST
+    def turn(self) -> Rates:
+        self._seconds = 0.0
+        rates = super().turn()
+        step_seconds = self.env.num_envs * self.steps / rates[ENVIRONMENT + self.label]
+        return {**rates, _SHARE + self.label: self._seconds / step_seconds}
 
-
-def _make(kind: str) -> HumanoidVectorEnv:
-    env = make_vector("Navigate", WORLDS, terrain=kind)
-    env.reset(seed=0)
-    return env
-
-
-def _timed_looks(env: HumanoidVectorEnv) -> list[float]:
-    """Seconds of each look at the ground from now on."""
-    looks: list[float] = []
-    look = env._observer._look
-
-    def timed(*arguments: Any) -> None:
+    def _timed_look(self, *arguments: Any) -> None:
         begin = time.perf_counter()
-        look(*arguments)
-        looks.append(time.perf_counter() - begin)
+        self._look(*arguments)
+        self._seconds += time.perf_counter() - begin
 
-    env._observer._look = timed  # type: ignore[method-assign]
-    return looks
+
+@pytest.mark.gate
+def test_rough_ground(benchmark: Any, effort: Effort, record: Record) -> None:
+    """`Navigate` on rough ground and on flat ground."""
+    worlds = effort.worlds(WORLDS)
+    contestants = {
+        kind: Looking(make_warm(worlds, env_config("Navigate", terrain=kind), make_task("Navigate")), f", {kind}")
+        for kind in GROUNDS
+    }
+    rounds = effort.run(benchmark, [*contestants.values()], rounds=15)
+    for kind, contestant in contestants.items():
+        rate, note = rate_of(rounds, f"{ENVIRONMENT}, {kind}"), f"{worlds} worlds"
+        physics = physics_of(contestant.env)
+        record.figures.append(Figure(f"{ENVIRONMENT}, Navigate, {kind} ground", rate, "control steps/s", note, physics))
+        contestant.close()
+    share = median(rates[f"{_SHARE}, rough"] for rates in rounds)
+    record.figures.append(Figure(_SHARE, share, "", f"rough ground, {worlds} worlds"))
+    record.ratios["Navigate, rough ground / flat"] = ratio_of(rounds, f"{ENVIRONMENT}, rough", f"{ENVIRONMENT}, flat")
+    assert effort.quick or share <= MOST

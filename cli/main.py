@@ -17,12 +17,13 @@ murmillo: simulated sword-and-shield fighters that learn skills from motion clip
   murmillo play       steer it in a browser:         murmillo play run=runs/<name>
   murmillo map        draw the latents of AdaptNet:  murmillo map runs/<base> runs/<style>
   murmillo motions    import motion clips, look at them, label them
+  murmillo bench      measure how fast this machine trains
   murmillo doctor     look at this machine: versions, graphics, threads, GPU, speed
 
 `murmillo <command> --help` says what a command takes. Settings are written name=value.
 """
 
-COMMANDS = ("train", "evaluate", "compare", "record", "play", "map", "motions", "doctor")
+COMMANDS = ("train", "evaluate", "compare", "record", "play", "map", "motions", "bench", "doctor")
 
 
 def main(argv: list[str] | None = None) -> int:

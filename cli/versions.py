@@ -3,6 +3,7 @@
 import os
 import platform
 import subprocess
+from collections.abc import Sequence
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -10,9 +11,9 @@ from typing import Any
 PACKAGES = ("murmillo", "torch", "mujoco", "gymnasium", "numpy", "hydra-core", "safetensors")
 
 
-def package_versions() -> dict[str, str | None]:
+def package_versions(names: Sequence[str] = PACKAGES) -> dict[str, str | None]:
     """Installed version by distribution name; None where it is missing."""
-    return {name: _version(name) for name in PACKAGES}
+    return {name: _version(name) for name in names}
 
 
 def _version(name: str) -> str | None:

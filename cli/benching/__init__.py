@@ -1,0 +1,1 @@
+"""Measuring speed: what `murmillo bench` and the benchmarks of the repository share."""
