@@ -1,5 +1,6 @@
 """Which skill each world is commanded: drawn at random, or as a user or an agent directs."""
 
+import math
 from collections.abc import Sequence
 
 import torch
@@ -35,6 +36,8 @@ class CommandedSkills:
         """Draw with these probabilities from now on, [K] and not negative; None draws all alike."""
         if weights is not None and weights.shape != (len(self.names),):
             raise SuiteError(f"skill weights of shape {tuple(weights.shape)}: needs one for each of {len(self.names)}")
+        if weights is not None and not (bool((weights >= 0).all()) and 0 < weights.sum() < math.inf):
+            raise SuiteError(f"skill weights {weights.tolist()}: needs finite ones, none below 0 and not all 0")
         self._weights = weights
 
     def draw(self, env_ids: Tensor, generator: torch.Generator) -> None:

@@ -265,7 +265,7 @@ class HumanoidVectorEnv(VectorEnv):
 
     @at_home
     def state_dict(self) -> dict[str, Any]:
-        """All that the next step depends on."""
+        """All that the next step depends on, but for what others set: skill weights and `set_ground_contact`."""
         parts = {"physics": self.physics.state_dict(), "starts": self._starts.state_dict()}
         parts |= {"task": self.task.state_dict(), "forces": self._forces.state_dict()}
         own = {name: getattr(self, f"_{name}").clone() for name in _OWN_STATE}

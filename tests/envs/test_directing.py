@@ -36,6 +36,9 @@ def test_as_many_weights_as_skills():
     env = make(1)
     with pytest.raises(SuiteError, match="one for each of"):
         env.set_skill_weights(torch.ones(len(env.skills) + 1))
+    for weight in (0.0, -1.0, torch.nan):
+        with pytest.raises(SuiteError, match="none below 0 and not all 0"):
+            env.set_skill_weights(torch.full((len(env.skills),), weight))
 
 
 def test_without_the_ground_no_episode_begins_on_it():
