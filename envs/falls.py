@@ -40,7 +40,7 @@ class FallDetector:
             if body not in character.bodies:
                 raise SuiteError(f"fall.heights.{body}: no such body; there are: {', '.join(character.bodies)}")
         falling = tuple(body for body in character.bodies if body not in character.feet)
-        self._bodies = torch.tensor(character.body_ids(falling))
+        self._bodies = torch.tensor(character.body_ids(falling), dtype=torch.int64)
         self._low = torch.tensor([config.heights.get(body, config.height) for body in falling], dtype=torch.float64)
         self._force, self._same_body = config.force, config.same_body
         self.touch_is_fall = False

@@ -81,7 +81,9 @@ class Strike(Task):
         super().bind(num_envs, character)
         arm = ("right_hand", "right_lower_arm") if self.config.form == "code" else ()
         may = character.bodies if self.config.any_body else ("sword", *arm, *character.feet)
-        self._forbidden = torch.tensor([i for i, body in enumerate(character.bodies) if body not in may])
+        self._forbidden = torch.tensor(
+            [i for i, body in enumerate(character.bodies) if body not in may], dtype=torch.int64
+        )
 
     def reset(self, env_ids: Tensor, state: State, generator: torch.Generator) -> None:
         n, config = len(env_ids), self.config
