@@ -18,6 +18,9 @@ from murmillo.agents.common.ranks import Part
 from murmillo.agents.common.rollout import Rollout
 from murmillo.agents.common.training import Means, adam, adam_state, load_adam_state, load_module, minimise
 
+_KL_BAND, _KL_STEP, _KL_REACH = 1.5, 1.3, 100.0
+"""How far a KL may be from where it is led to, the factor of the rate's steps, and its bound either way."""
+
 
 class Minibatch(dict[str, Tensor]):
     """Rows of a rollout by name, `[B, ...]`; "state" is normalised.
@@ -51,6 +54,8 @@ class PPOConfig:
         max_grad_norm: bound on the norm of the gradient of policy and critic together; None for none.
         target_kl: end the passes at the first minibatch on which the policy is further than this from the one that
             acted [nat]; None goes on.
+        lead_kl: lead the policy's learning rate from `policy_learning_rate` to where an iteration's mean KL is about this
+            [nat]; None keeps it.
     """
 
     hidden: tuple[int, ...] = (1024, 1024, 512)
@@ -67,12 +72,13 @@ class PPOConfig:
     value_weight: float = 1.0
     max_grad_norm: float | None = None
     target_kl: float | None = None
+    lead_kl: float | None = None
 
     def __post_init__(self) -> None:
         check_at_least(1, self, "agent.ppo", "epochs", "minibatch")
         check_at_least(0, self, "agent.ppo", "policy_learning_rate", "value_learning_rate")
         check_at_least(0, self, "agent.ppo", "mean_init_scale", "bound_weight", "value_weight")
-        check_above_zero(self, "agent.ppo", "std", "clip", "max_grad_norm", "target_kl")
+        check_above_zero(self, "agent.ppo", "std", "clip", "max_grad_norm", "target_kl", "lead_kl")
         if not 0 <= self.noise_correlation < 1:
             raise AgentError(f"agent.ppo.noise_correlation={self.noise_correlation}: needs at least 0 and less than 1")
 
@@ -158,6 +164,8 @@ class PPO:
             ([*model.policy.parameters(), *condition_parameters], config.policy_learning_rate),
             (model.critic.parameters(), config.value_learning_rate),
         )
+        self._pace = 1.0
+        """Of the policy: its learning rate as a multiple of the config's."""
 
     def update(
         self,
@@ -182,7 +190,8 @@ class PPO:
             other_loss: further weighted losses by name, of what is no minibatch and the same on all ranks.
 
         Returns:
-            means of the losses, the KL divergence [nat], the clipped share and the entropy [nat].
+            means of the losses, the KL divergence [nat], the clipped share and the entropy [nat]; the policy's learning
+            rate of the next iteration where it is led.
 
         Raises:
             AgentError: the minibatch is larger than the rollout.
@@ -207,7 +216,20 @@ class PPO:
                 break
             minimise(self.optimizer, losses, config.max_grad_norm, ranks=rollout.ranks)
         self.model.observe(rollout)
-        return means.result(rollout.ranks)
+        stats = means.result(rollout.ranks)
+        return stats if config.lead_kl is None else stats | {"policy_rate": self._lead(stats["kl"] / config.lead_kl)}
+
+    def _lead(self, excess: float) -> float:
+        """Slow down after an iteration that went too far, hurry after one that hardly moved; the new rate."""
+        if excess > _KL_BAND:
+            self._set_pace(max(self._pace / _KL_STEP, 1 / _KL_REACH))
+        elif excess < 1 / _KL_BAND:
+            self._set_pace(min(self._pace * _KL_STEP, _KL_REACH))
+        return self._pace * self.config.policy_learning_rate
+
+    def _set_pace(self, pace: float) -> None:
+        self._pace = pace
+        self.optimizer.param_groups[0]["lr"] = pace * self.config.policy_learning_rate
 
     def _losses(
         self,
@@ -242,8 +264,10 @@ class PPO:
         return losses, weigh(scores)
 
     def state_dict(self) -> dict[str, Any]:
-        return {"model": self.model.state_dict(), "optimizer": adam_state(self.optimizer)}
+        return {"model": self.model.state_dict(), "optimizer": adam_state(self.optimizer), "pace": self._pace}
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         load_module(self.model, state["model"], "policy and critic")
         load_adam_state(self.optimizer, state["optimizer"])
+        if self.config.lead_kl is not None:
+            self._set_pace(state["pace"])

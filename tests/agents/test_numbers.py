@@ -34,6 +34,7 @@ from murmillo.agents.common.warm_start import WarmStartConfig
         (PPOConfig, "clip", math.nan, "agent.ppo.clip=nan: needs a number above 0"),
         (PPOConfig, "max_grad_norm", 0.0, "agent.ppo.max_grad_norm=0.0: needs a number above 0"),
         (PPOConfig, "target_kl", 0.0, "agent.ppo.target_kl=0.0: needs a number above 0"),
+        (PPOConfig, "lead_kl", 0.0, "agent.ppo.lead_kl=0.0: needs a number above 0"),
         (DiscriminatorConfig, "learning_rate", -1.0, "agent.discriminator.learning_rate=-1.0: needs at least 0"),
         (DiscriminatorConfig, "gradient_penalty", -1.0, "agent.discriminator.gradient_penalty=-1.0: needs at least 0"),
         (DiscriminatorConfig, "updates", 0, "agent.discriminator.updates=0: needs at least 1"),

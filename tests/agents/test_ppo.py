@@ -1,5 +1,6 @@
 from typing import Any
 
+import pytest
 import torch
 
 from murmillo.agents.common.advantages import normalise_advantage
@@ -97,3 +98,30 @@ def test_a_further_loss_and_a_condition_reach_the_networks(generator: torch.Gene
     )
     assert stats["pull"] > 0
     assert all(parameter.grad is not None for parameter in ppo.model.parameters())
+
+
+def test_the_rate_is_led_to_the_kl_that_is_asked_for(generator: torch.Generator) -> None:
+    rates: dict[float, list[float]] = {}
+    for goal in (1e-6, 0.02, 1e6):
+        ppo = make(epochs=2, lead_kl=goal)
+        stats = [ppo.update(rollout(ppo, generator), generator) for _ in range(40)]
+        rates[goal] = [stat["policy_rate"] for stat in stats]
+        assert ppo.optimizer.param_groups[0]["lr"] == rates[goal][-1]
+        assert ppo.optimizer.param_groups[1]["lr"] == 1e-2  # the critic's is nobody's to lead
+        if goal == 0.02:
+            assert sum(stat["kl"] for stat in stats[20:]) / 20 == pytest.approx(goal, rel=0.6)
+    assert rates[1e-6][:2] == pytest.approx([1e-2 / 1.3, 1e-2 / 1.3**2])
+    assert rates[1e6][:2] == pytest.approx([1.3e-2, 1.69e-2])
+    assert rates[1e-6][-1] == pytest.approx(1e-4)  # a hundredth of the config's, and no less
+    assert rates[1e6][-1] == pytest.approx(1.0)
+
+
+def test_a_led_rate_goes_on_where_it_was(generator: torch.Generator) -> None:
+    ppo = make(lead_kl=1e-6)
+    for _ in range(3):
+        ppo.update(rollout(ppo, generator), generator)
+    again, kept = make(lead_kl=1e-6), make()
+    for other in (again, kept):
+        other.load_state_dict(ppo.state_dict())
+    assert again.optimizer.param_groups[0]["lr"] == ppo.optimizer.param_groups[0]["lr"] < 1e-2
+    assert kept.optimizer.param_groups[0]["lr"] == 1e-2
