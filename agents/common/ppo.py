@@ -54,8 +54,8 @@ class PPOConfig:
         max_grad_norm: bound on the norm of the gradient of policy and critic together; None for none.
         target_kl: end the passes at the first minibatch on which the policy is further than this from the one that
             acted [nat]; None goes on.
-        lead_kl: lead the policy's learning rate from `policy_learning_rate` to where an iteration's mean KL is about this
-            [nat]; None keeps it.
+        lead_kl: lead the policy's learning rate from `policy_learning_rate` to where the mean KL of an iteration is
+            about this [nat]; None keeps it.
     """
 
     hidden: tuple[int, ...] = (1024, 1024, 512)
