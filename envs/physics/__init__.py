@@ -3,6 +3,8 @@
 from collections.abc import Callable
 from typing import Literal
 
+import torch
+
 from murmillo.envs.character import Character
 from murmillo.envs.errors import SuiteError
 from murmillo.envs.physics.cpu import CpuPhysics
@@ -46,6 +48,11 @@ def make_physics(
             raise SuiteError(f"{name}={number}: needs a number, or 0 for {_ZEROS[name]}")
     scene = scene if isinstance(scene, Scene) else Scene(scene)
     if backend == "warp":
+        if device == "auto" and not torch.cuda.is_available():  # asked before Warp, which has a line of its own for it
+            raise SuiteError(
+                "physics=warp: there is no GPU that torch can use; take physics=cpu, or device=cpu for Warp's own CPU "
+                "device, which is slow"
+            )
         return _warp()(scene, num_envs, device, contacts, constraints)
     if device not in ("auto", "cpu"):
         raise SuiteError(f"device={device}: physics=cpu simulates on the CPU; take physics=warp")

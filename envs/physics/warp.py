@@ -293,10 +293,9 @@ def _find_device(name: str) -> wp.Device:
     """Warp's device of this name; "auto" is the first GPU."""
     wp.config.log_level = max(wp.config.log_level, wp.LOG_ERROR)  # no banner; what matters is said here
     if name == "auto":
-        if not wp.is_cuda_available() or not torch.cuda.is_available():
+        if not wp.is_cuda_available():
             raise SuiteError(
-                "physics=warp: there is no GPU that both Warp and torch can use; take physics=cpu, or device=cpu for "
-                "Warp's own CPU device, which is slow"
+                "physics=warp: Warp finds no GPU, though torch does; update the driver, or take physics=cpu"
             )
         name = "cuda:0"
     try:

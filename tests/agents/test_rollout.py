@@ -6,6 +6,7 @@ from gymnasium import spaces
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 from murmillo.agents.common.errors import AgentError
+from murmillo.agents.common.ranks import Ranks
 from murmillo.agents.common.rollout import Rollout, true_next_obs
 
 
@@ -88,3 +89,29 @@ def test_minibatches_visit_every_row_once(size: int, generator: torch.Generator)
     batches = [rows for rows, _ in Rollout(2, 3).minibatches(size, generator)]
     assert sorted(torch.cat(batches).tolist()) == list(range(6))
     assert max(len(batch) for batch in batches) == min(size, 6)
+
+
+class Together(Ranks):
+    """One of two ranks, which are told what the other would say: that it leaves out nothing, or three rows."""
+
+    def sum(self, x: torch.Tensor) -> torch.Tensor:
+        if x.dtype == torch.bool:
+            return torch.tensor(True)
+        return torch.tensor([12 - 3, 12]) if len(x) == 2 else x
+
+
+def test_minibatches_of_ranks_go_without_the_rows_that_one_of_them_leaves_out() -> None:
+    parts = []
+    for rank in (0, 1):
+        rollout = Rollout(4, 3, Together(rank, 2))
+        left_out = torch.zeros(4, 3, dtype=torch.bool)
+        left_out[1, :] = rank == 0
+        rollout.leave_out(left_out)
+        assert rollout.alike().part is rollout.part
+        batches = list(rollout.minibatches(8, torch.Generator().manual_seed(0)))
+        parts.append(torch.cat([rows for rows, part in batches if part.weight]).sort().values.tolist())
+        assert sum(part.total for _, part in batches) == 21
+        rollout["number"] = torch.arange(12).view(4, 3)
+        assert rollout.flat("number").tolist() == ([0, 1, 2, *range(6, 12)] if rank == 0 else list(range(12)))
+    assert parts == [list(range(9)), list(range(12))]
+    assert rollout.all_samples == 24
