@@ -172,6 +172,17 @@ def test_an_update_moves_the_policy_and_reports_finite_numbers(
     assert not torch.equal(before, values(agent, env, rollout))
 
 
+def test_nothing_is_learned_from_rows_that_are_left_out(make: Maker, skills: int, generator: torch.Generator) -> None:
+    env = PointMass(17, skills=skills)
+    agent = make(env, generator)
+    rollout = collected(agent, env)
+    left_out = torch.zeros(rollout.shape, dtype=torch.bool)
+    left_out[2, 3] = left_out[7, 0] = True
+    rollout["advantage"][left_out] = torch.nan
+    rollout.leave_out(left_out)
+    assert all(torch.tensor(value).isfinite() for value in agent.update(rollout).values())
+
+
 def test_the_discriminator_remembers_earlier_iterations(make_low: Maker, generator: torch.Generator) -> None:
     env = PointMass(15)
     agent = make_low(env, generator, discriminator=small_ase().discriminator)

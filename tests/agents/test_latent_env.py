@@ -299,3 +299,24 @@ def test_n_and_n_more_iterations_are_2n_bit_for_bit(low_level: Path, tmp_path: P
     second.load(tmp_path / "half")
     second.run()
     assert equal(checkpoint.load(tmp_path / "whole"), checkpoint.load(tmp_path / "half"))
+
+
+def test_a_decision_in_which_a_world_diverged_says_so() -> None:
+    """In whichever of its steps; a world that was over before is a new episode's, and none of the decision's."""
+
+    class Diverging(Heading):
+        count = 0
+
+        def step(self, actions: np.ndarray) -> tuple:
+            obs, reward, terminated, truncated, infos = super().step(actions)
+            self.count += 1
+            healed = np.zeros(self.num_envs, bool)
+            healed[1] = self.count == 2
+            healed[2] = self.count == 5
+            terminated = terminated | healed
+            terminated[2] |= self.count == 3
+            return obs, reward, terminated, truncated, infos | {"healed": healed}
+
+    _, _, terminated, _, infos = begun(Diverging(4, bound=9.0)).step(torch.ones(4, 3).numpy())
+    assert infos["healed"].tolist() == [False, True, False, False]
+    assert terminated.tolist() == [False, True, True, False]

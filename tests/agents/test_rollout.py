@@ -115,3 +115,13 @@ def test_minibatches_of_ranks_go_without_the_rows_that_one_of_them_leaves_out() 
         assert rollout.flat("number").tolist() == ([0, 1, 2, *range(6, 12)] if rank == 0 else list(range(12)))
     assert parts == [list(range(9)), list(range(12))]
     assert rollout.all_samples == 24
+
+
+def test_rows_that_were_left_out_come_back_in_the_next_iteration() -> None:
+    rollout = Rollout(2, 3)
+    rollout["number"] = torch.arange(6).view(2, 3)
+    rollout.leave_out(torch.tensor([[False, True, False], [False, False, True]]))
+    assert rollout.flat("number").tolist() == [0, 2, 3, 4]
+    rollout.leave_out(torch.zeros(2, 3, dtype=torch.bool))
+    assert rollout.flat("number").tolist() == list(range(6))
+    assert sorted(torch.cat([rows for rows, _ in rollout.minibatches(4, torch.Generator())]).tolist()) == list(range(6))
