@@ -162,7 +162,7 @@ class ASE:
             return {}
         z = batch.part.of(sample_sphere(batch.part.total, config.latent_dim, self.generator))
         other_mean = self.model.policy(batch["state"], z)
-        std = self.model.policy.log_std.exp()
+        std = self.model.policy.log_std.detach().exp()
         loss = diversity_loss(mean, other_mean, batch["latent"], z, std, config.diversity)
         return {"diversity": config.diversity_weight * loss}
 

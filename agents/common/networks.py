@@ -132,7 +132,7 @@ class Policy(nn.Module):
 
 
 class GaussianPolicy(Policy):
-    """pi(a | s, c) = N(mu(s, c), diag std^2) with a fixed std (ASE, section 8.2)."""
+    """pi(a | s, c) = N(mu(s, c), diag std^2), with a fixed std (ASE, section 8.2) unless it is learned."""
 
     def __init__(
         self,
@@ -145,6 +145,7 @@ class GaussianPolicy(Policy):
         condition_dim: int = 0,
         style_hidden: Sequence[int] = (),
         mean_init_scale: float = 1.0,
+        learn_std: bool = False,
         activation: Callable[[], nn.Module] = nn.ReLU,
     ) -> None:
         """
@@ -157,6 +158,7 @@ class GaussianPolicy(Policy):
             condition_dim: C, size of the latent or label beside the state; 0 for none.
             style_hidden: hidden sizes of the style network in front of the condition; empty for none.
             mean_init_scale: factor on the initial weights of the last layer.
+            learn_std: whether `std` is only where it begins, and is learned for each action dimension.
             activation: after every hidden layer.
         """
         super().__init__()
@@ -165,7 +167,11 @@ class GaussianPolicy(Policy):
         self.head = linear(hidden[-1], action_dim, generator)
         with torch.no_grad():
             self.head.weight *= mean_init_scale
-        self.register_buffer("log_std", torch.full((action_dim,), std).log())
+        log_std = torch.full((action_dim,), std).log()
+        if learn_std:
+            self.log_std = nn.Parameter(log_std)
+        else:
+            self.register_buffer("log_std", log_std)
 
     def encode(self, state: Tensor, told: Told = None) -> Tensor:
         """The state, and beside it the condition as the style network shows it."""

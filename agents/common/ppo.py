@@ -42,6 +42,7 @@ class PPOConfig:
         hidden: sizes of the hidden layers of policy and critic.
         style_hidden: hidden sizes of the style network before the policy's condition; empty for none.
         std: the policy's standard deviation; the paper's variance is 0.0025.
+        learn_std: whether that is only where it begins, one learned for each action dimension.
         noise_correlation: between the noise of one action and the next; the papers' noise is white.
         mean_init_scale: factor on the initial weights of the policy's last layer.
         policy_learning_rate: Adam's step for the policy.
@@ -61,6 +62,7 @@ class PPOConfig:
     hidden: tuple[int, ...] = (1024, 1024, 512)
     style_hidden: tuple[int, ...] = (512, 256)
     std: float = 0.05
+    learn_std: bool = False
     noise_correlation: float = 0.0
     mean_init_scale: float = 1.0
     policy_learning_rate: float = 2e-5
@@ -114,6 +116,7 @@ class ActorCritic(nn.Module):
             condition_dim=condition_dim,
             style_hidden=config.style_hidden if condition_dim else (),
             mean_init_scale=config.mean_init_scale,
+            learn_std=config.learn_std,
         )
         self.critic = critic or Critic(state_dim, condition_dim, config.hidden, generator)
         self.state_normalizer: Any = state_normalizer or RunningNormalizer((state_dim,))

@@ -58,3 +58,15 @@ def test_the_style_network_answers_within_its_tanh(generator: torch.Generator) -
     style = policy(style_hidden=(8,)).style(100 * torch.randn(20, 4, generator=generator))
     assert style.shape == (20, 4)
     assert style.abs().max() <= 1
+
+
+def test_a_learned_std_begins_at_the_given_one_and_has_a_gradient(generator: torch.Generator) -> None:
+    state, latent = torch.randn(9, 5, generator=generator), torch.randn(9, 4, generator=generator)
+    fixed, learned = policy(), policy(learn_std=True)
+    assert torch.equal(fixed.log_std, learned.log_std)
+    assert fixed.state_dict().keys() == learned.state_dict().keys()
+    assert dict(learned.named_parameters()).keys() - dict(fixed.named_parameters()).keys() == {"log_std"}
+    mean = learned(state, latent)
+    learned.log_prob(mean.detach() + 1.0, mean).sum().backward()
+    assert learned.log_std.grad is not None
+    assert learned.log_std.grad.min() > 0  # what happened was farther off than a standard deviation
