@@ -34,15 +34,20 @@ def check_settings(config: TrainConfig) -> None:
         CommandError: naming the key, what was wrong and what would be right.
     """
     check_training(config, _LEAST)
-    if config.env.window != config.agent.window:
-        raise CommandError(
-            f"env.window={config.env.window}: the agent sees agent.window={config.agent.window} frames; "
-            "set agent.window alone"
-        )
+    check_window(config)
     if config.runner.reward_weights.get("residual") and not config.env.residual_force:
         raise CommandError(
             f"runner.reward_weights.residual={config.runner.reward_weights['residual']}: there are no residual forces "
             "to be sparing with; set env.residual_force (50 N are the published code's), or drop this weight"
+        )
+
+
+def check_window(config: Any) -> None:
+    """Refuse an environment that shows another number of frames than the agent sees."""
+    if config.env.window != config.agent.window:
+        raise CommandError(
+            f"env.window={config.env.window}: the agent sees agent.window={config.agent.window} frames; "
+            "set agent.window alone"
         )
 
 

@@ -76,6 +76,24 @@ def assemble(
     return path
 
 
+def going_on(lines: Sequence[str]) -> str:
+    """The last section: commands, and what each is for."""
+    return "\n".join(["## How to go on", "", "```", *lines, "```"])
+
+
+def train_film_measure(folder: Path, scalars: Scalars) -> list[str]:
+    """Commands for a run of a task or of AdaptNet, whatever came of it."""
+    run = shlex.quote(str(folder))
+    samples = max(5_000_000, 2 * Effort.of(scalars).samples)
+    return [
+        "# train this run on, for an hour at most",
+        f"murmillo train run.resume={run} runner.max_minutes=60 runner.samples={samples}",
+        "# another film, and surer figures",
+        f"murmillo record run={run} seconds=20",
+        f"murmillo evaluate run={run} worlds=1024",
+    ]
+
+
 class Effort(NamedTuple):
     """What a training has taken: samples, minutes, and samples a second."""
 
@@ -267,4 +285,4 @@ def _going_on(folder: Path, config: Any, scalars: Scalars) -> str:
         "# the curves of all runs, live",
         f"tensorboard --logdir {shlex.quote(str(folder.parent))}",
     ]
-    return "\n".join(["## How to go on", "", "```", *lines, "```"])
+    return going_on(lines)

@@ -2,7 +2,7 @@
 
 from murmillo.cli.adaptation.base import BaseRun
 from murmillo.cli.adaptation.config import AdaptNetTrainConfig
-from murmillo.cli.checks import check_training
+from murmillo.cli.checks import check_training, check_window
 from murmillo.cli.errors import CommandError
 from murmillo.envs.character import load_character
 from murmillo.envs.motion import load_clips
@@ -31,11 +31,7 @@ def check_settings(config: AdaptNetTrainConfig, base: BaseRun | None) -> None:
     """
     check_training(config, _LEAST)
     config.make_task()
-    if config.env.window != config.agent.window:
-        raise CommandError(
-            f"env.window={config.env.window}: the agent sees agent.window={config.agent.window} frames; "
-            "set agent.window alone"
-        )
+    check_window(config)
     if config.env.features != "links":
         raise CommandError(f"env.features={config.env.features}: AdaptNet sees the links of its last frames; drop this")
     if base is not None:

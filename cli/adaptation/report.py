@@ -83,15 +83,8 @@ def _published(results: dict[str, Any], clips: list[str]) -> str:
 
 
 def _going_on(folder: Path, config: Any, scalars: Scalars) -> str:
-    samples = common.Effort.of(scalars).samples
     run = shlex.quote(str(folder))
-    lines = [
-        "# train this run on, for an hour at most",
-        f"murmillo train run.resume={run} runner.max_minutes=60 runner.samples={max(5_000_000, 2 * samples)}",
-        "# another film, and surer figures",
-        f"murmillo record run={run} seconds=20",
-        f"murmillo evaluate run={run} worlds=1024",
-    ]
+    lines = common.train_film_measure(folder, scalars)
     if config.stage == "base":
         lines += [
             "# give it another style, and slippery ground",
@@ -104,4 +97,4 @@ def _going_on(folder: Path, config: Any, scalars: Scalars) -> str:
             f"murmillo record run={run} alpha=0.5",
             f"murmillo map {shlex.quote(config.base)} {run}",
         ]
-    return "\n".join(["## How to go on", "", "```", *lines, "```"])
+    return common.going_on(lines)

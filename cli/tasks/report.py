@@ -72,19 +72,12 @@ def _figures(config: Any, results: dict[str, Any] | None) -> str:
 
 
 def _going_on(folder: Path, config: Any, scalars: Scalars) -> str:
-    samples = common.Effort.of(scalars).samples
     run = shlex.quote(str(folder))
-    lines = [
-        "# train this run on, for an hour at most",
-        f"murmillo train run.resume={run} runner.max_minutes=60 runner.samples={max(5_000_000, 2 * samples)}",
-        "# another film, and surer figures",
-        f"murmillo record run={run} seconds=20",
-        f"murmillo evaluate run={run} worlds=1024",
-    ]
+    lines = common.train_film_measure(folder, scalars)
     if config.low != NONE:
         lines += [
             "# the same task without a policy below, and the two side by side",
             f"murmillo train task={config.choices.task} low=none run.name=scratch",
             f"murmillo compare {run} {shlex.quote(str(folder.parent / 'scratch'))}",
         ]
-    return "\n".join(["## How to go on", "", "```", *lines, "```"])
+    return common.going_on(lines)
