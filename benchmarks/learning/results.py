@@ -12,8 +12,13 @@ from murmillo.cli.report import read_scalars
 CURVES = {
     "episode/length": "episode length [steps]",
     "reward/style": "style reward",
+    "reward/task": "goal reward",
+    "reward/imitation": "imitation reward",
     "discriminator/agent_score": "discriminator on the agent",
 }
+_OF_ADAPTNET = "reward/imitation"
+_POINTLESS = {True: {"discriminator/agent_score"}, False: {"reward/task"}}
+"""What says nothing of a run of AdaptNet, whose reward it is, and of others, which have no task."""
 _POINTS = 40
 
 
@@ -36,7 +41,8 @@ def _run(folder: Path) -> dict[str, Any]:
     scalars = read_scalars(folder / runs.SCALARS)
     samples = scalars["samples"]
     places = np.linspace(samples[0], samples[-1], _POINTS)
-    curves = {name: _curve(places, samples, smooth(scalars[name])) for name in ("seconds", *CURVES)}
+    shown = [name for name in CURVES if name in scalars and name not in _POINTLESS[_OF_ADAPTNET in scalars]]
+    curves = {name: _curve(places, samples, smooth(scalars[name])) for name in ("seconds", *shown)}
     measured = runs.read_json(folder / runs.MEASURES, {}).get("trained", {})
     return {"samples": places.astype(int).tolist(), **curves, "measured": measured}
 
@@ -55,9 +61,11 @@ def plot(results: dict[str, Any], path: Path) -> Path:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(4.2 * len(CURVES), 3.4), dpi=110, layout="constrained")
+    first = next(seed for kept in results["variants"].values() for seed in kept["seeds"].values())
+    curves = {name: title for name, title in CURVES.items() if name in first}
+    figure = Figure(figsize=(4.2 * len(curves), 3.4), dpi=110, layout="constrained")
     FigureCanvasAgg(figure)
-    for axes, (name, title) in zip(figure.subplots(1, len(CURVES)), CURVES.items(), strict=True):
+    for axes, (name, title) in zip(figure.subplots(1, len(curves)), curves.items(), strict=True):
         for number, (variant, kept) in enumerate(results["variants"].items()):
             seeds = list(kept["seeds"].values())
             if not seeds:
@@ -70,7 +78,8 @@ def plot(results: dict[str, Any], path: Path) -> Path:
             axes.plot(places / 1e6, np.mean(lines, axis=0), color=f"C{number}", label=f"{variant} ({len(lines)})")
         axes.set_xlabel("samples [million]")
         axes.set_title(title, fontsize=10)
-        axes.set_ylim(bottom=0.0)
+        if name != _OF_ADAPTNET:  # it is signed
+            axes.set_ylim(bottom=0.0)
         axes.spines[["top", "right"]].set_visible(False)
         axes.grid(axis="y", alpha=0.3)
     figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False)

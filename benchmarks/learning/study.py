@@ -24,6 +24,7 @@ from murmillo.cli.runs import LAST, MEASURES, SCALARS
 HERE = Path(__file__).parent
 RUNS = Path("runs/learning")
 RESULTS = HERE.parents[1] / "docs" / "learning"
+ADAPTNET = "agent=adaptnet"
 
 
 @dataclass(frozen=True)
@@ -97,7 +98,8 @@ def run(study: Study, variant: str, seed: int) -> bool:
     else:
         shutil.rmtree(folder, ignore_errors=True)  # it ended before there was a checkpoint to go on from
         asked.write_text(json.dumps(words), encoding="utf-8")
-        words += [f"run.root={folder.parent}", f"run.name={name}", "run.video=false", "run.evaluate=false"]
+        words += [f"run.root={folder.parent}", f"run.name={name}", "run.video=false"]
+        words += [] if ADAPTNET in words else ["run.evaluate=false"]  # its evaluation is its only measurement
     print(f"{study.name}: {name}", flush=True)
     return train(words) == 0 and (folder / MEASURES).exists()
 

@@ -330,9 +330,11 @@ def _compile(model: mujoco.MjModel, device: wp.Device) -> None:
         _LONG, _say, [f"compiling kernels for {device.alias}; the first time takes minutes, later ones seconds"]
     )
     late.start()
-    mjw.step(_put(model), mjw.make_data(model, 1))
-    wp.synchronize_device(device)
-    late.cancel()
+    try:
+        mjw.step(_put(model), mjw.make_data(model, 1))
+        wp.synchronize_device(device)
+    finally:
+        late.cancel()
     if (seconds := time.monotonic() - begun) > _LONG:
         _say(f"compiled in {seconds:.0f} s; kept in {wp.config.kernel_cache_dir}")
 
