@@ -37,7 +37,7 @@ class ActionNoise:
         worlds = self.worlds(num_envs)
         noise = worlds.of(torch.randn(worlds.total, dim, generator=self.generator))
         if self.correlation:
-            if self._last is not None:
+            if self._last is not None and len(self._last) == num_envs:  # it may have been loaded to play elsewhere
                 noise = self.correlation * self._last + (1 - self.correlation**2) ** 0.5 * noise
             self._last = noise
         return noise

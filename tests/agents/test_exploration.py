@@ -49,3 +49,11 @@ def test_it_goes_on_where_it_was(correlation: float) -> None:
     again.load_state_dict(kept)
     for step in (3, 4, 5):
         assert torch.equal(again.step(WORLDS, DIM), at_once[step])
+
+
+def test_noise_that_was_learned_with_begins_anew_in_other_worlds() -> None:
+    learned = ActionNoise(torch.Generator().manual_seed(0), 0.9)
+    learned.step(WORLDS, DIM)
+    playing, fresh = (ActionNoise(torch.Generator().manual_seed(1), 0.9) for _ in range(2))
+    playing.load_state_dict(learned.state_dict())
+    assert torch.equal(playing.step(2, DIM), fresh.step(2, DIM))
