@@ -43,7 +43,7 @@ def check_settings(config: TrainConfig) -> None:
 
 
 def check_window(config: Any) -> None:
-    """Refuse an environment that shows another number of frames than the agent sees."""
+    """Refuse an environment that shows another number of frames than the agent sees. Raises CommandError."""
     if config.env.window != config.agent.window:
         raise CommandError(
             f"env.window={config.env.window}: the agent sees agent.window={config.agent.window} frames; "

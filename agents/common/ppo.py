@@ -42,7 +42,8 @@ class PPOConfig:
         hidden: sizes of the hidden layers of policy and critic.
         style_hidden: hidden sizes of the style network before the policy's condition; empty for none.
         std: the policy's standard deviation; the paper's variance is 0.0025.
-        learn_std: whether that is only where it begins, one learned for each action dimension.
+        learn_std: whether that is only where it begins, one learned for each action dimension. AdaptNet's is always
+            learned, by state.
         noise_correlation: between the noise of one action and the next; the papers' noise is white.
         mean_init_scale: factor on the initial weights of the policy's last layer.
         policy_learning_rate: Adam's step for the policy.

@@ -13,12 +13,12 @@ CURVES = {
     "episode/length": "episode length [steps]",
     "reward/style": "style reward",
     "reward/task": "goal reward",
-    "reward/imitation": "imitation reward",
+    "reward/imitation": "imitation reward",  # AdaptNet's name for it
     "discriminator/agent_score": "discriminator on the agent",
 }
-_OF_ADAPTNET = "reward/imitation"
-_POINTLESS = {True: {"discriminator/agent_score"}, False: {"reward/task"}}
-"""What says nothing of a run of AdaptNet, whose reward it is, and of others, which have no task."""
+_IMITATION = "reward/imitation"
+_SHOWN = ("episode/length", "reward/style", "discriminator/agent_score")
+_SHOWN_OF_ADAPTNET = ("episode/length", "reward/task", _IMITATION)
 _POINTS = 40
 
 
@@ -41,7 +41,7 @@ def _run(folder: Path) -> dict[str, Any]:
     scalars = read_scalars(folder / runs.SCALARS)
     samples = scalars["samples"]
     places = np.linspace(samples[0], samples[-1], _POINTS)
-    shown = [name for name in CURVES if name in scalars and name not in _POINTLESS[_OF_ADAPTNET in scalars]]
+    shown = _SHOWN_OF_ADAPTNET if _IMITATION in scalars else _SHOWN
     curves = {name: _curve(places, samples, smooth(scalars[name])) for name in ("seconds", *shown)}
     measured = runs.read_json(folder / runs.MEASURES, {}).get("trained", {})
     return {"samples": places.astype(int).tolist(), **curves, "measured": measured}
@@ -78,7 +78,7 @@ def plot(results: dict[str, Any], path: Path) -> Path:
             axes.plot(places / 1e6, np.mean(lines, axis=0), color=f"C{number}", label=f"{variant} ({len(lines)})")
         axes.set_xlabel("samples [million]")
         axes.set_title(title, fontsize=10)
-        if name != _OF_ADAPTNET:  # it is signed
+        if name != _IMITATION:  # it is signed
             axes.set_ylim(bottom=0.0)
         axes.spines[["top", "right"]].set_visible(False)
         axes.grid(axis="y", alpha=0.3)

@@ -99,7 +99,7 @@ def run(study: Study, variant: str, seed: int) -> bool:
         shutil.rmtree(folder, ignore_errors=True)  # it ended before there was a checkpoint to go on from
         asked.write_text(json.dumps(words), encoding="utf-8")
         words += [f"run.root={folder.parent}", f"run.name={name}", "run.video=false"]
-        words += [] if ADAPTNET in words else ["run.evaluate=false"]  # its evaluation is its only measurement
+        words += [] if ADAPTNET in words else ["run.evaluate=false"]  # its runs know no such setting
     print(f"{study.name}: {name}", flush=True)
     return train(words) == 0 and (folder / MEASURES).exists()
 
