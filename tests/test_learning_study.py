@@ -111,6 +111,21 @@ def test_a_study_is_run_kept_and_taken_up_again(study: ModuleType, monkeypatch: 
     torch.set_num_threads(threads)
 
 
+def test_a_study_of_adaptnet_keeps_what_that_is_rewarded_for(
+    study: ModuleType, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    threads = torch.get_num_threads()
+    monkeypatch.setattr(study, "train", lambda words: main(["train", *words]))
+    small = ["agent.recurrent=8", "agent.ppo.epochs=1", "agent.discriminator.recurrent=8", "env.episode_steps=80"]
+    write(STUDY | {"task": "adaptnet", "words": [*TINY, *small], "variants": {"base": []}})
+    study.main(["tiny"])
+    run = json.loads(Path("docs", "tiny.json").read_text())["variants"]["base"]["seeds"]["1"]
+    assert list(run) == ["samples", "seconds", "episode/length", "reward/task", "reward/imitation", "measured"]
+    assert -1 <= run["reward/imitation"][-1] <= 1
+    assert run["measured"]["length"] > 0
+    torch.set_num_threads(threads)
+
+
 @pytest.mark.parametrize(
     ("content", "name", "line"),
     [

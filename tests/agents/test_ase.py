@@ -1,4 +1,5 @@
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -66,6 +67,18 @@ def test_diversity_is_asked_of_two_different_latents(make: Callable, generator: 
     mean = agent.model.policy(batch["state"], condition)
     loss = agent._diversity(batch, mean)["diversity"].item()
     assert loss != pytest.approx(1.0, abs=0.05)  # what the same latent twice, and so the same action, would give
+
+
+@pytest.mark.parametrize("make", [make_ase, make_case])
+def test_diversity_does_not_ask_for_noise(make: Callable, generator: torch.Generator) -> None:
+    """By more of it two skills would differ less in units of it: the paper's form must not learn that."""
+    agent = make(PointMass(3), generator, diversity="kl", ppo=replace(small_ase().ppo, learn_std=True))
+    rows = {"state": torch.randn(64, 4, generator=generator), "label": torch.zeros(64, dtype=torch.int64)}
+    batch = Minibatch(rows, Part(ALONE, 64))
+    batch["latent"] = sample_sphere(64, 4, generator)
+    agent._diversity(batch, torch.zeros(64, 2))["diversity"].backward()
+    assert agent.model.policy.head.weight.grad is not None
+    assert agent.model.policy.log_std.grad is None
 
 
 @pytest.mark.parametrize("shared", [True, False])

@@ -25,8 +25,8 @@ MEAN = torch.tensor([0.3, -0.2])
 STD = 0.1
 
 
-def policy(gumbel: float | None = None) -> HybridPolicy:
-    config = PPOConfig(hidden=(8,), style_hidden=(), std=STD, mean_init_scale=0.0)
+def policy(gumbel: float | None = None, **changes: Any) -> HybridPolicy:
+    config = PPOConfig(**{"hidden": (8,), "style_hidden": (), "std": STD, "mean_init_scale": 0.0, **changes})
     return HybridPolicy(4, 3, 2, config, torch.Generator().manual_seed(0), gumbel=gumbel)
 
 
@@ -45,6 +45,11 @@ def test_log_probabilities_are_the_labels_plus_the_latents() -> None:
     torch.testing.assert_close(policy().log_prob(action, parameters(3)), label + gaussian(z))
     stacked = policy().log_prob(action.expand(7, 3, 5), parameters(3).expand(7, 3, 5))
     torch.testing.assert_close(stacked, (label + gaussian(z)).expand(7, 3))
+
+
+def test_the_latents_std_is_learned_if_that_is_asked_for() -> None:
+    assert "log_std" not in dict(policy().named_parameters())
+    assert "log_std" in dict(policy(learn_std=True).named_parameters())
 
 
 def test_the_relaxed_labels_density_is_that_of_the_concrete_distribution(generator: torch.Generator) -> None:
