@@ -47,8 +47,9 @@ STYLE = Metric(
     "Style reward",
     "",
     3,
-    "-log(1 - D), where D is the discriminator's probability that the motion is a clip. Up is good, yet the judge "
-    "learns too: a level line means that the character keeps up with it.",
+    "-log(1 - D), where D is the discriminator's probability that the motion is a clip; of a hinge "
+    "(agent.discriminator.loss) its score. Up is good, yet the judge learns too: a level line means that the character "
+    "keeps up with it.",
 )
 SKILL = Metric(
     "reward/skill",
@@ -62,14 +63,14 @@ AGENT_SCORE = Metric(
     "Discriminator on the agent",
     "",
     3,
-    "probability it gives that the agent's motion is a clip. Near 0 the judge sees through it at once.",
+    "how much like a clip it finds the agent's motion, 0 to 1. Near 0 the judge sees through it at once.",
 )
 CLIP_SCORE = Metric(
     "discriminator/demonstration_score",
     "Discriminator on the clips",
     "",
     3,
-    "the same probability for true clips. The two meet at 0.5 when the judge cannot tell them apart.",
+    "the same for true clips. The two meet when the judge cannot tell them apart.",
 )
 
 COMMANDED = Metric(
@@ -77,7 +78,7 @@ COMMANDED = Metric(
     "Commanded skill's head",
     "",
     3,
-    "probability that the discriminator's head of the commanded skill gives to the agent's motion.",
+    "score, 0 to 1, that the discriminator's head of the commanded skill gives to the agent's motion.",
 )
 OTHER_HEADS = Metric(
     "heads/agent_other",
@@ -91,7 +92,7 @@ RIGHT_LABEL = Metric(
     "Clips under their label",
     "",
     3,
-    "probability of true clips by the head of their own label.",
+    "score of true clips by the head of their own label.",
 )
 WRONG_LABEL = Metric(
     "heads/demonstration_other",
@@ -105,7 +106,7 @@ MISMATCHED = Metric(
     "Agent under another latent",
     "",
     3,
-    "probability that the discriminator gives to the agent's motion when it is told that another motion was asked for. "
+    "score that the discriminator gives to the agent's motion when it is told that another motion was asked for. "
     "Well below that on the agent: the character does what its latent says.",
 )
 RESIDUAL = Metric(

@@ -24,9 +24,9 @@ def _heads(heads: dict[str, dict[str, float]]) -> str:
     rows = [f"| {AGES[age]} | {h['right']:.3f} | {_figure(h.get('other'))} |" for age, h in heads.items()]
     return "\n".join(
         [
-            "In the same episodes: the probability that the trained discriminator's head of the commanded skill gives "
-            "to the motion, and the mean of what the heads of all other skills give to it. A policy that obeys has the "
-            "first well above the second.",
+            "In the same episodes: the score, 0 to 1, that the trained discriminator's head of the commanded skill "
+            "gives to the motion, and the mean of what the heads of all other skills give to it. A policy that obeys "
+            "has the first well above the second.",
             "",
             "| policy | head of the commanded skill | other heads |",
             "|---|---:|---:|",
@@ -43,7 +43,7 @@ def _skills(skills: dict[str, dict[str, float]]) -> str:
     return "\n".join(
         [
             f"Focal sampling gives each skill a share of the practice; an even one is {100 / len(skills):.2f} %. The "
-            "score is the discriminator's mean probability that the agent's motion under this label is a clip of it.",
+            "score is the discriminator's mean for the agent's motion under this label being a clip of it.",
             "",
             "| skill | share of the practice | score |",
             "|---|---:|---:|",

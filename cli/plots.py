@@ -46,7 +46,7 @@ def _plot(scalars: Scalars, metrics: list[Metric], path: Path) -> Path:
     axes.set_xlabel("training time [min]")
     axes.set_ylabel(f"{metrics[0].title} [{unit}]" if len(metrics) == 1 and unit else metrics[0].title)
     if len(metrics) > 1:
-        axes.set_ylabel("probability" if metrics[0] is AGENT_SCORE else "reward")
+        axes.set_ylabel("score" if metrics[0] is AGENT_SCORE else "reward")
         axes.legend(frameon=False)
     if all(np.nanmin(scalars[metric.scalar]) >= 0.0 for metric in metrics):
         axes.set_ylim(bottom=0.0)

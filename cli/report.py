@@ -184,8 +184,8 @@ def _ages(measures: dict[str, Any]) -> str:
         "## Did it learn?",
         "",
         "Each policy played one episode in each world: started in a clip, with its mean action and random latents, "
-        "until it fell or the clock ran out. The style score is the probability that the *trained* discriminator gives "
-        "for the motion being a clip; one judge for all makes the ages comparable.",
+        "until it fell or the clock ran out. The style score is how much like a clip the *trained* "
+        "discriminator finds the motion, 0 to 1; one judge for all makes the ages comparable.",
         "",
         "| policy | episode length [steps] | fall rate | style score | episodes | steps |",
         "|---|---:|---:|---:|---:|---:|",

@@ -2,12 +2,13 @@
 
 import dataclasses
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 import torch
 from torch import Tensor
 
+from murmillo.agents.common.discriminator import Discriminator
 from murmillo.agents.common.interface import Agent, Labelled
 from murmillo.agents.common.rollout import Rollout, tensors, true_next_obs
 from murmillo.envs import HumanoidVectorEnv
@@ -16,6 +17,12 @@ AGES = {"untrained": "before training", "warm_started": "after the warm start", 
 """The ages of a policy that are measured, in words."""
 
 _HEAD = "head/"
+
+
+class Judge(Agent, Protocol):
+    """An agent whose reward term "style" its discriminator gives."""
+
+    discriminator: Discriminator
 
 
 @dataclass(frozen=True)
@@ -27,7 +34,7 @@ class Measures:
         steps: control steps that were measured, of all worlds together.
         length: of an episode [steps]; the clock's end where it never fell.
         fall_rate: share of the episodes that ended by a fall.
-        score: the judge's probability that a motion is a clip, mean over the steps.
+        score: how much like a clip the judge finds a motion (`Discriminator.score`), mean over the steps.
         rewards: the judge's reward terms by name, mean over the steps.
         heads: of a judge with labels, what its heads give by name (`Labelled.head_scores`), mean over the steps.
         residual_share: mean L2 norm of the residual forces [N] over that of the joint torques [N m], if there are any.
@@ -47,7 +54,7 @@ class Measures:
 
 
 @torch.no_grad()
-def measure(env: HumanoidVectorEnv, agent: Agent, judge: Agent, seed: int) -> Measures:
+def measure(env: HumanoidVectorEnv, agent: Agent, judge: Judge, seed: int) -> Measures:
     """Let `agent` play one episode in each world; `judge`, the trained agent, gives the rewards.
 
     With one judge, policies of different ages can be compared: each one's own discriminator has seen through it.
@@ -80,13 +87,13 @@ def measure(env: HumanoidVectorEnv, agent: Agent, judge: Agent, seed: int) -> Me
     return Measures(worlds, steps, length.mean().item(), fell.float().mean().item(), score, means, heads, share)
 
 
-def _terms(judge: Agent, row: Rollout) -> dict[str, Tensor]:
-    """[N] the judge's reward terms and its probability D, from style = -log(1 - D); the scores of its heads, if any."""
+def _terms(judge: Judge, row: Rollout) -> dict[str, Tensor]:
+    """[N] the judge's reward terms and the score behind their style; the scores of its heads, if any."""
     terms = {name: value[0] for name, value in judge.rewards(row).items()}
     heads = judge.head_scores(row) if isinstance(judge, Labelled) else {}
     return {
         **terms,
-        "score": 1.0 - torch.exp(-terms["style"]),
+        "score": judge.discriminator.score_of(terms["style"]),
         **{_HEAD + name: value[0] for name, value in heads.items()},
     }
 

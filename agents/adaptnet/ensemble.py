@@ -12,7 +12,8 @@ from murmillo.agents.common.discriminator import (
     Discriminator,
     DiscriminatorConfig,
     Windows,
-    input_gradient,
+    interpolate,
+    slope_penalty,
 )
 from murmillo.agents.common.networks import mlp
 from murmillo.agents.common.numbers import check_at_least
@@ -105,13 +106,11 @@ def hinge_loss(
     fake = ensemble.prepare(agent.window, agent.mask)
     real_logits, fake_logits = (ensemble.judge(ensemble.features(x)) for x in (real, fake))
     part = agent.part or Part(ALONE, len(real))
-    share = part.of(torch.rand(part.total, 1, generator=generator))
-    between = torch.lerp(fake, real, share).requires_grad_()
-    gradient = input_gradient(ensemble.judge(ensemble.features(between)), between)
+    between = interpolate(fake, real, part, generator)
     parts = {
         "agent": F.relu(1 + fake_logits).mean(),
         "demonstration": F.relu(1 - real_logits).mean(),
-        "gradient_penalty": penalty * (gradient.norm(dim=1) - 1).square().mean(),
+        "gradient_penalty": penalty * slope_penalty(ensemble.judge(ensemble.features(between)), between, 1.0),
     }
     with torch.no_grad():
         scores = {

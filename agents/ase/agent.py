@@ -9,7 +9,7 @@ from torch import Tensor
 from murmillo.agents.ase.config import ASEConfig
 from murmillo.agents.ase.encoder import Encoder
 from murmillo.agents.common.dimensions import dimensions
-from murmillo.agents.common.discriminator import Discriminator, Windows, discriminator_loss, style_reward
+from murmillo.agents.common.discriminator import Discriminator, Windows, discriminator_loss
 from murmillo.agents.common.exploration import ActionNoise
 from murmillo.agents.common.interface import Demonstrations, Obs, Step
 from murmillo.agents.common.latents import LatentSequence, sample_sphere
@@ -97,7 +97,7 @@ class ASE:
         for window, latent in zip(rollout["next_window"], rollout["latent"], strict=True):
             x = self.discriminator.prepare(window, self.masks.draw(len(window), self.generator, part=worlds))
             features = self.discriminator.features(x)
-            style.append(style_reward(self.discriminator.judge(features)))
+            style.append(self.discriminator.reward(self.discriminator.judge(features)))
             skill.append(skill_reward(self.encoder(x, features), latent, config.kappa, config.skill_reward))
         terms = {"style": torch.stack(style)}
         return terms | {"skill": torch.stack(skill)} if config.skill_discovery else terms
@@ -119,6 +119,7 @@ class ASE:
                 agent=Windows(agent, mask=self.masks.draw(k, generator, part=part), part=part),
                 replay=Windows(replay["window"], mask=self.masks.draw(k, generator, part=old), part=old),
                 demonstration=Windows(drawn["window"], mask=drawn.get("mask"), part=part),
+                generator=generator,
             )
             losses = dict(loss.parts)
             if config.skill_discovery:

@@ -12,7 +12,7 @@ from murmillo.agents.calm.encoder import MotionEncoder
 from murmillo.agents.calm.losses import alignment_loss, uniformity_loss
 from murmillo.agents.calm.motions import MotionSequence, cut, select
 from murmillo.agents.common.dimensions import dimensions
-from murmillo.agents.common.discriminator import Discriminator, Windows, discriminator_loss, style_reward
+from murmillo.agents.common.discriminator import Discriminator, Windows, discriminator_loss
 from murmillo.agents.common.exploration import ActionNoise
 from murmillo.agents.common.interface import Demonstrations, Obs, Step
 from murmillo.agents.common.latents import sample_sphere
@@ -119,7 +119,7 @@ class CALM:
         """r = -log(1 - D(s, s' | z)) of eq. 4, `[T, N]`."""
         names = [name for name in ("next_window", "latent", "mask") if name in rollout]
         logits = [self.discriminator.logits(*row) for row in zip(*(rollout[name] for name in names), strict=True)]
-        return {"style": style_reward(torch.stack(logits))}
+        return {"style": self.discriminator.reward(torch.stack(logits))}
 
     def update(self, rollout: Rollout) -> dict[str, float]:
         """Eq. 7 for the discriminator; eq. 4 with eqs. 5 and 6 for policy, critic and encoder."""
@@ -137,7 +137,7 @@ class CALM:
                 replay = Windows(**remembered, part=old)
             demonstration = self._encoded_demonstration(pool, part)
             negative = self._negative(demonstration)
-            loss = discriminator_loss(self.discriminator, agent, replay, demonstration, negative)
+            loss = discriminator_loss(self.discriminator, agent, replay, demonstration, negative, generator=generator)
             minimise(self.optimizer, loss.parts, ranks=rollout.ranks)
             means.add({**loss.parts, **loss.scores})
         means.add({"agent_mismatched_score": self._mismatched_score(agent)})
@@ -205,11 +205,12 @@ class CALM:
 
     @torch.no_grad()
     def _mismatched_score(self, agent: Windows) -> Tensor:
-        """The discriminator's mean probability for the agent's windows under latents that they did not follow."""
+        """The discriminator's mean score of the agent's windows under latents that they did not follow."""
         assert agent.condition is not None
         assert agent.part is not None
         other = agent.part.of(agent.part.whole(agent.condition).roll(1, 0))
-        return agent.weight * self.discriminator.logits(agent.window, other, agent.mask).sigmoid().mean()
+        logits = self.discriminator.logits(agent.window, other, agent.mask)
+        return agent.weight * self.discriminator.score(logits).mean()
 
     def _observe_demonstrations(self) -> None:
         """The discriminator's and the encoder's normalisers see the clips."""

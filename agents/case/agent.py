@@ -10,7 +10,7 @@ from murmillo.agents.case.config import CASEConfig
 from murmillo.agents.case.focal import FocalSampling
 from murmillo.agents.case.networks import Encoder, LabelEmbedding, SkillHeads
 from murmillo.agents.common.dimensions import dimensions, skill_count
-from murmillo.agents.common.discriminator import Discriminator, Windows, discriminator_loss, style_reward
+from murmillo.agents.common.discriminator import Discriminator, Windows, discriminator_loss
 from murmillo.agents.common.exploration import ActionNoise
 from murmillo.agents.common.interface import Demonstrations, Obs, Step
 from murmillo.agents.common.latents import LatentSequence, sample_sphere
@@ -126,7 +126,7 @@ class CASE:
         fields = ("next_window", "label", "latent")
         for window, label, latent in zip(*(rollout[name] for name in fields), strict=True):
             x = self.discriminator.prepare(window, self._masks_for(label, worlds))
-            style.append(style_reward(self.discriminator.judge(self.discriminator.features(x), label)))
+            style.append(self.discriminator.reward(self.discriminator.judge(self.discriminator.features(x), label)))
             skill.append(skill_reward(self.encoder(x, label), latent, config.kappa, config.skill_reward))
         terms = {"style": torch.stack(style)}
         return terms | {"skill": torch.stack(skill)} if config.skill_discovery else terms
@@ -143,7 +143,8 @@ class CASE:
             if len(self.replay):
                 remembered, old = self.replay.sample(k, generator)
                 replay = self._agent_windows(remembered["window"], remembered["label"], old)
-            loss = discriminator_loss(self.discriminator, agent, replay, self._draw_demonstrations(part))
+            demonstration = self._draw_demonstrations(part)
+            loss = discriminator_loss(self.discriminator, agent, replay, demonstration, generator=generator)
             losses = dict(loss.parts)
             if config.skill_discovery:
                 mu_q = self.encoder(loss.agent_inputs, labels[rows])
@@ -189,7 +190,7 @@ class CASE:
 
     @torch.no_grad()
     def head_scores(self, rollout: Rollout) -> dict[str, Tensor]:
-        """Probabilities `[T, N]` that the commanded skill's head gives, "right", and the mean of all "other" heads."""
+        """Scores `[T, N]` that the commanded skill's head gives, "right", and the mean of all "other" heads."""
         steps, worlds = (
             zip(rollout["next_window"], rollout["label"], strict=True),
             rollout.ranks.worlds(rollout.num_envs),
@@ -202,7 +203,7 @@ class CASE:
         """Focal sampling by the scores of this rollout; how far the heads of the discriminator hold the skills apart.
 
         Returns:
-            means of the probabilities that the right heads and the others give to the agent and to demonstrations.
+            means of the scores that the right heads and the others give to the agent and to demonstrations.
         """
         agent = self.head_scores(rollout)
         started = self.iterations >= self.config.focal_start
@@ -213,9 +214,9 @@ class CASE:
         return rollout.ranks.mean_scalars(means)
 
     def _heads(self, windows: Windows) -> dict[str, Tensor]:
-        """Probabilities `[B]` that the head of each window's label gives, and the mean of all other heads, if any."""
+        """Scores `[B]` that the head of each window's label gives, and the mean of all other heads, if any."""
         x = self.discriminator.prepare(windows.window, windows.mask)
-        score = self.discriminator.head(self.discriminator.features(x)).sigmoid()
+        score = self.discriminator.score(self.discriminator.head(self.discriminator.features(x)))
         right = self.discriminator.condition.pick(score, windows.condition)
         others = score.shape[1] - 1
         return {"right": right} | ({"other": (score.sum(1) - right) / others} if others else {})

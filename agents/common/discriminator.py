@@ -11,10 +11,13 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional as F
 
+from murmillo.agents.common.errors import AgentError
 from murmillo.agents.common.networks import Dropout, linear, mlp
 from murmillo.agents.common.normalizer import RunningNormalizer
-from murmillo.agents.common.numbers import check_at_least
+from murmillo.agents.common.numbers import check_above_zero, check_at_least
 from murmillo.agents.common.ranks import ALONE, Part, Ranks
+
+LOSSES = ("logistic", "hinge")
 
 
 @dataclass
@@ -26,7 +29,10 @@ class DiscriminatorConfig:
         learning_rate: Adam's step.
         minibatch: K, windows a step from the rollout, from the replay and from the demonstrations each.
         updates: steps an iteration; the released code takes one with every policy minibatch, 8 x 6 = 48.
-        gradient_penalty: w_gp of eq. 14, on the logit's gradient at the normalised demonstrations.
+        loss: "logistic", as ASE, CALM and C·ASE were published, or the "hinge" of AdaptNet (its eq. 10).
+        gradient_penalty: w_gp of eq. 14, on the logit's gradient at the normalised demonstrations; of a hinge lambda.
+        slope: norm of the gradient that a hinge's penalty leads to; AdaptNet's ensemble leads its sum to 1, each of
+            16 discriminators to a sixteenth.
         logit_decay: on the squared weights of the last layer (released code).
         weight_decay: on the squared weights of trunk and last layer (released code).
         replay_size: windows kept from earlier iterations (released code).
@@ -39,7 +45,9 @@ class DiscriminatorConfig:
     learning_rate: float = 2e-5
     minibatch: int = 4096
     updates: int = 48
+    loss: str = "logistic"
     gradient_penalty: float = 5.0
+    slope: float = 0.0625
     logit_decay: float = 0.01
     weight_decay: float = 1e-4
     replay_size: int = 200_000
@@ -51,6 +59,9 @@ class DiscriminatorConfig:
         check_at_least(
             0, self, "agent.discriminator", "learning_rate", "gradient_penalty", "logit_decay", "weight_decay"
         )
+        check_above_zero(self, "agent.discriminator", "slope")
+        if self.loss not in LOSSES:
+            raise AgentError(f"agent.discriminator.loss={self.loss} is not one of {', '.join(LOSSES)}")
 
 
 class Windows(NamedTuple):
@@ -150,6 +161,21 @@ class Discriminator(nn.Module):
         """Logits `[B]` of raw windows `[B, W, D]`; the arguments are the first of `Windows`."""
         return self.judge(self.features(self.prepare(window, mask), condition), condition)
 
+    def score(self, logits: Tensor) -> Tensor:
+        """How much like a demonstration, 0 to 1, any shape: the probability D, or of a hinge where in [-1, 1] it is."""
+        return 0.5 * (1 + logits.clamp(-1, 1)) if self.config.loss == "hinge" else logits.sigmoid()
+
+    def reward(self, logits: Tensor) -> Tensor:
+        """What the policy gets, never negative, any shape: -log(1 - D), or of a hinge the score.
+
+        The score is AdaptNet's eq. 11, moved from [-1, 1] to [0, 1] lest falling early pays.
+        """
+        return self.score(logits) if self.config.loss == "hinge" else style_reward(logits)
+
+    def score_of(self, reward: Tensor) -> Tensor:
+        """The score that a reward was given for, any shape."""
+        return reward if self.config.loss == "hinge" else 1.0 - torch.exp(-reward)
+
 
 def leave_out(frames: Tensor, mask: Tensor | None) -> Tensor:
     """Normalised frames `[B, W, D]` with zeros, the mean, where the mask `[B, D]` is true."""
@@ -177,22 +203,31 @@ def discriminator_loss(
     replay: Windows,
     demonstration: Windows,
     negative: Windows | None = None,
+    *,
+    generator: torch.Generator,
 ) -> DiscriminatorLoss:
     """ASE's eq. 14 with the regularisers of the released code, as named parts whose sum is minimised.
 
-        1/2 [ BCE(agent, replay and negative, 0) + BCE(demonstration, 1) ] + w_gp E ||d logit / dx||^2
+        1/2 [ L(agent, replay and negative, 0) + L(demonstration, 1) ] + w_gp P
             + logit_decay ||w_logit||^2 + weight_decay ||w||^2
 
-    Eq. 14 sums its two expectations without the 1/2; with it, w_gp = 5 means what it means in the released code. The
-    gradient penalty is on the logit at the *normalised* demonstrations, since only so is the weight free of units, and
-    before their masks, since what a clip leaves out is no input of its logit. `negative` are true windows under a
-    condition that is not theirs (CALM, eq. 7).
+    Eq. 14 sums its two expectations without the 1/2; with it, w_gp = 5 means what it means in the released code.
+    `negative` are true windows under a condition that is not theirs (CALM, eq. 7).
+
+    Of loss "logistic" L is the binary cross-entropy and P is E ||d logit / dx||^2 at the *normalised* demonstrations,
+    since only so is the weight free of units, and before their masks, since what a clip leaves out is no input of its
+    logit. Of loss "hinge" (AdaptNet, eq. 10) L is max(0, 1 + logit) and max(0, 1 - logit), and P is
+    E (||d logit / dx|| / slope - 1)^2 at windows that `generator` draws between those of the agent and of the
+    demonstrations, of which there must be equally many, under the condition of the latter: such a discriminator goes
+    on telling better from worse where the other is sure of both.
     """
     config = discriminator.config
+    hinge = config.loss == "hinge"
+    loss = _hinge if hinge else F.softplus
     discriminator.train()  # dropout is for these losses only
-    x = discriminator.normalizer(demonstration.window).requires_grad_()
-    demo_features = discriminator.features(leave_out(x, demonstration.mask).flatten(1), demonstration.condition)
-    demo_logits = discriminator.judge(demo_features, demonstration.condition)
+    x, told = discriminator.normalizer(demonstration.window).requires_grad_(not hinge), demonstration.condition
+    demo_inputs = leave_out(x, demonstration.mask).flatten(1)
+    demo_logits = discriminator.judge(discriminator.features(demo_inputs, told), told)
     agent_inputs = discriminator.prepare(agent.window, agent.mask)
     agent_features = discriminator.features(agent_inputs, agent.condition)
     agent_logits = discriminator.judge(agent_features, agent.condition)
@@ -201,6 +236,13 @@ def discriminator_loss(
     fakes = {"agent": (agent, agent_logits), "replay": (replay, replay_logits)}
     if negative is not None:
         fakes["negative"] = negative, discriminator.logits(*negative[:3])
+    if hinge:
+        between = interpolate(agent_inputs, demo_inputs, demonstration.part, generator)
+        seen = leave_out(between.view_as(x), demonstration.mask).flatten(1)
+        logits = discriminator.judge(discriminator.features(seen, told), told)
+        penalty = slope_penalty(logits, between, config.slope)
+    else:
+        penalty = gradient_penalty(demo_logits, x)
     discriminator.eval()
     share = 0.5 / sum(windows.total for windows, _ in fakes.values())
     real = demonstration.weight
@@ -208,27 +250,44 @@ def discriminator_loss(
     logit_square = discriminator.head.weight.square().sum()
     parts = {
         **{
-            name: share * (windows.weight * windows.total / len(logits)) * F.softplus(logits).sum()
+            name: share * (windows.weight * windows.total / len(logits)) * loss(logits).sum()
             for name, (windows, logits) in fakes.items()
         },
-        "demonstration": 0.5 * real * F.softplus(-demo_logits).mean(),
-        "gradient_penalty": config.gradient_penalty * real * gradient_penalty(demo_logits, x),
+        "demonstration": 0.5 * real * loss(-demo_logits).mean(),
+        "gradient_penalty": config.gradient_penalty * real * penalty,
         "logit_decay": config.logit_decay * logit_square,
         "weight_decay": config.weight_decay * (logit_square + sum(weight.square().sum() for weight in weights)),
     }
     with torch.no_grad():
         scores = {
-            "agent_score": agent.weight * agent_logits.sigmoid().mean(),
-            "demonstration_score": real * demo_logits.sigmoid().mean(),
+            "agent_score": agent.weight * discriminator.score(agent_logits).mean(),
+            "demonstration_score": real * discriminator.score(demo_logits).mean(),
             "agent_accuracy": agent.weight * (agent_logits < 0).float().mean(),
             "demonstration_accuracy": real * (demo_logits > 0).float().mean(),
         }
     return DiscriminatorLoss(parts, scores, agent_inputs, agent_features)
 
 
+def _hinge(x: Tensor) -> Tensor:
+    return F.relu(1 + x)
+
+
+def interpolate(fake: Tensor, real: Tensor, part: Part | None, generator: torch.Generator) -> Tensor:
+    """Inputs `[B, ...]` on the lines between two as many, which are this part of all ranks'; a leaf to differentiate
+    by."""
+    part = part or Part(ALONE, len(real))
+    share = part.of(torch.rand(part.total, 1, generator=generator))
+    return torch.lerp(fake.detach(), real.detach(), share).requires_grad_()
+
+
 def gradient_penalty(logits: Tensor, x: Tensor) -> Tensor:
     """E ||d logit / dx||^2 of logits `[B]` at the inputs `[B, ...]` that they came from, ready to be differentiated."""
     return input_gradient(logits, x).square().sum(-1).mean()
+
+
+def slope_penalty(logits: Tensor, x: Tensor, slope: float) -> Tensor:
+    """E (||d logit / dx|| / slope - 1)^2 of logits at the inputs that they came from, as for `gradient_penalty`."""
+    return (input_gradient(logits, x).norm(dim=1) / slope - 1).square().mean()
 
 
 def input_gradient(logits: Tensor, x: Tensor) -> Tensor:

@@ -107,7 +107,7 @@ class Labelled(Protocol):
     def head_scores(self, rollout: Rollout) -> dict[str, Tensor]:
         """What the discriminator gives to each motion `[T, N]` under its label, "right", and under others, "other".
 
-        Probabilities; there is no "other" where there is only one label.
+        Scores, 0 to 1; there is no "other" where there is only one label.
         """
         ...
 

@@ -156,7 +156,7 @@ def _ages(ages: dict[str, Any]) -> str:
         [
             "## Episodes",
             "",
-            "Started in a clip, until a fall or the clock; the score is the trained discriminator's probability.",
+            "Started in a clip, until a fall or the clock; the score is the trained discriminator's.",
             "",
             "| policy | length [steps] | fall rate | style score | episodes |",
             "|---|---:|---:|---:|---:|",

@@ -6,6 +6,7 @@ A new agent joins with one line in `LOW_LEVEL` or `AGENTS`.
 import copy
 import dataclasses
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -22,12 +23,19 @@ from tests.agents.toy_adaptnet import make_adaptnet
 from tests.agents.toy_tasks import make_commanded, make_task
 
 Maker = Callable[..., Agent]
-LOW_LEVEL: dict[str, Maker] = {"ase": make_ase, "calm": make_calm, "case": make_case}
+HINGE = {"discriminator": replace(small_ase().discriminator, loss="hinge")}
+LOW_LEVEL: dict[str, Maker] = {
+    "ase": make_ase,
+    "calm": make_calm,
+    "case": make_case,
+    "case_hinge": lambda env, generator, **changes: make_case(env, generator, **{**HINGE, **changes}),
+}
 AGENTS: dict[str, Maker] = {**LOW_LEVEL, "adaptnet": make_adaptnet, "task": make_task, "commanded": make_commanded}
 REWARDS = {
     "ase": {"style": 1.0, "skill": 0.5},
     "calm": {"style": 1.0},
     "case": {"style": 1.0, "skill": 0.5},
+    "case_hinge": {"style": 1.0, "skill": 0.5},
     "adaptnet": {"task": 0.5, "imitation": 0.5},
     "task": {"task": 1.0},
     "commanded": {"task": 1.0},

@@ -52,7 +52,8 @@ def test_gradient_penalty_is_on_the_normalised_input(generator: torch.Generator)
         discriminator.normalizer = type(discriminator.normalizer)((3,))
         discriminator.normalizer.update(windows * scale)
         sample = Windows(windows * scale)
-        penalties.append(discriminator_loss(discriminator, sample, sample, sample).parts["gradient_penalty"].item())
+        loss = discriminator_loss(discriminator, sample, sample, sample, generator=generator)
+        penalties.append(loss.parts["gradient_penalty"].item())
     assert penalties[0] > 0
     assert penalties[0] == pytest.approx(penalties[1], rel=1e-3)
 
@@ -67,7 +68,7 @@ def test_parts_of_the_loss_by_hand(generator: torch.Generator) -> None:
         discriminator.head.weight.fill_(0.5)
         discriminator.head.bias.fill_(math.log(3.0))  # D = 3/4
     sample = Windows(torch.randn(6, 2, 3, generator=generator))
-    loss = discriminator_loss(discriminator, sample, Windows(sample.window[:2]), sample)
+    loss = discriminator_loss(discriminator, sample, Windows(sample.window[:2]), sample, generator=generator)
     parts = {name: part.item() for name, part in loss.parts.items()}
     assert parts["agent"] + parts["replay"] == pytest.approx(0.5 * math.log(4))  # -log(1 - 3/4)
     assert parts["agent"] == pytest.approx(3 * parts["replay"])  # each window counts alike
@@ -80,19 +81,104 @@ def test_parts_of_the_loss_by_hand(generator: torch.Generator) -> None:
     assert loss.scores["agent_accuracy"].item() == 0.0
 
 
+def test_the_hinge_by_hand(generator: torch.Generator) -> None:
+    config = DiscriminatorConfig(loss="hinge", slope=0.5, gradient_penalty=10.0)
+    discriminator = linear_one(torch.tensor([0.3, -0.4, 0.0]), config, generator)
+    agent, replay, demonstration = (
+        torch.tensor(value).expand(4, 1, 3) for value in ([5.0, 0, 0], [1.0, 0, 0], [0, 1.0, 0])
+    )
+    loss = discriminator_loss(
+        discriminator, Windows(agent), Windows(replay), Windows(demonstration), generator=generator
+    )
+    parts = {name: part.item() for name, part in loss.parts.items()}
+    assert parts["agent"] == pytest.approx(0.25 * (1 + 1.5), rel=1e-4)  # two kinds of fakes share the half
+    assert parts["replay"] == pytest.approx(0.25 * (1 + 0.3), rel=1e-4)
+    assert parts["demonstration"] == pytest.approx(0.5 * (1 + 0.4), rel=1e-4)
+    assert parts["gradient_penalty"] == pytest.approx(0.0, abs=1e-7)  # ||(0.3, -0.4)|| is the slope
+    assert loss.scores["agent_score"].item() == 1.0  # a logit of 1.5 is beyond the clip
+    assert loss.scores["demonstration_score"].item() == pytest.approx(0.3, rel=1e-4)
+    config.slope = 0.25
+    parts = discriminator_loss(
+        discriminator, Windows(agent), Windows(replay), Windows(demonstration), generator=generator
+    ).parts
+    assert parts["gradient_penalty"].item() == pytest.approx(10.0, rel=1e-4)  # (0.5 / 0.25 - 1)^2
+
+
+def test_the_hinge_is_flat_beyond_its_margins(generator: torch.Generator) -> None:
+    config = DiscriminatorConfig(loss="hinge")
+    discriminator = linear_one(torch.tensor([1.0, 0.0, 0.0]), config, generator)
+    sure = [Windows(torch.tensor([x, 0.0, 0.0]).expand(4, 1, 3)) for x in (-3.0, 3.0)]
+    parts = discriminator_loss(discriminator, sure[0], sure[0], sure[1], generator=generator).parts
+    assert [parts[name].item() for name in ("agent", "replay", "demonstration")] == [0, 0, 0]
+
+
+def test_the_hinges_penalty_is_between_agent_and_demonstrations(generator: torch.Generator) -> None:
+    discriminator = Discriminator(1, 1, DiscriminatorConfig(hidden=(1,), loss="hinge", slope=1.0), generator)
+    with torch.no_grad():  # logit = relu(x): slope 0 below 0, 1 above
+        for layer in (discriminator.trunk[0], discriminator.head):
+            assert isinstance(layer, nn.Linear)
+            layer.weight.fill_(1.0)
+            layer.bias.fill_(0.0)
+    agent, demonstration = torch.full((4000, 1, 1), -3.0), torch.full((4000, 1, 1), 1.0)
+    sample = Windows(agent)
+    parts = discriminator_loss(discriminator, sample, sample, Windows(demonstration), generator=generator).parts
+    assert parts["gradient_penalty"].item() == pytest.approx(5 * 0.75, rel=0.05)  # three quarters of the way are flat
+
+
+def test_the_hinges_penalty_asks_nothing_of_what_is_left_out(generator: torch.Generator) -> None:
+    config = DiscriminatorConfig(loss="hinge", slope=0.5)
+    discriminator = linear_one(torch.tensor([0.3, -0.4, 7.0]), config, generator)
+    mask = torch.tensor([False, False, True]).expand(4, 3)
+    sample = Windows(torch.randn(4, 1, 3, generator=generator), mask=mask)
+    parts = discriminator_loss(discriminator, sample, sample, sample, generator=generator).parts
+    assert parts["gradient_penalty"].item() == pytest.approx(0.0, abs=1e-7)
+
+
+def linear_one(weight: Tensor, config: DiscriminatorConfig, generator: torch.Generator) -> Discriminator:
+    """Logits w x of windows of one frame, which are not scaled."""
+    discriminator = Discriminator(1, 3, config, generator, trunk=nn.Sequential(nn.Flatten()))
+    discriminator.head = nn.Linear(3, 1, bias=False)
+    discriminator.head.weight.data[:] = weight
+    return discriminator
+
+
+def test_scores_and_rewards(generator: torch.Generator) -> None:
+    logits = torch.tensor([-5.0, -1.0, 0.0, 0.5, 1.0, 9.0])
+    logistic, hinge = (
+        Discriminator(1, 3, DiscriminatorConfig(hidden=(4,), loss=loss), generator) for loss in ("logistic", "hinge")
+    )
+    assert hinge.score(logits).tolist() == [0, 0, 0.5, 0.75, 1, 1]
+    assert torch.equal(hinge.reward(logits), hinge.score(logits))
+    assert torch.equal(logistic.score(logits), logits.sigmoid())
+    assert torch.equal(logistic.reward(logits), style_reward(logits))
+    for discriminator in (logistic, hinge):
+        torch.testing.assert_close(discriminator.score_of(discriminator.reward(logits)), discriminator.score(logits))
+
+
+def test_an_unknown_loss_is_refused() -> None:
+    with pytest.raises(AgentError, match=r"agent\.discriminator\.loss=wgan is not one of logistic, hinge"):
+        DiscriminatorConfig(loss="wgan")
+    with pytest.raises(AgentError, match=r"agent\.discriminator\.slope=0"):
+        DiscriminatorConfig(slope=0)
+
+
 def test_style_reward() -> None:
     reward = style_reward(torch.tensor([0.0, 100.0, -100.0]))
     assert reward.tolist() == pytest.approx([math.log(2), -math.log(1e-4), 0.0], abs=1e-6)
     assert style_reward(torch.tensor(0.0), scale=2.0).item() == pytest.approx(2 * math.log(2))
 
 
-def test_it_learns_to_tell_two_clouds_apart(generator: torch.Generator) -> None:
-    discriminator = make(generator, hidden=(32, 32))
+@pytest.mark.parametrize("loss_name", ["logistic", "hinge"])
+def test_it_learns_to_tell_two_clouds_apart(loss_name: str, generator: torch.Generator) -> None:
+    config = DiscriminatorConfig(hidden=(32, 32), loss=loss_name, slope=1.0)
+    discriminator = Discriminator(2, 3, config, generator)
     optimizer = torch.optim.Adam(discriminator.parameters(), lr=3e-3)
     for _ in range(150):
         agent = torch.randn(64, 2, 3, generator=generator) - 1
         demonstration = torch.randn(64, 2, 3, generator=generator) + 1
-        loss = discriminator_loss(discriminator, Windows(agent), Windows(agent), Windows(demonstration))
+        loss = discriminator_loss(
+            discriminator, Windows(agent), Windows(agent), Windows(demonstration), generator=generator
+        )
         optimizer.zero_grad()
         torch.stack(list(loss.parts.values())).sum().backward()
         optimizer.step()
@@ -134,6 +220,6 @@ def test_a_condition_plugs_in_without_a_new_loss(strategy: Condition, told: Tens
     assert logits[0] != logits[1]  # the same window, judged by another condition
     assert logits[1] == logits[3]
     sample = Windows(window, told)
-    parts = discriminator_loss(discriminator, sample, sample, sample).parts
+    parts = discriminator_loss(discriminator, sample, sample, sample, generator=generator).parts
     torch.stack(list(parts.values())).sum().backward()
     assert all(parameter.grad is not None for parameter in discriminator.parameters())

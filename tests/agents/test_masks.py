@@ -50,7 +50,7 @@ def test_masked_features_have_no_influence_on_logits_and_gradients(generator: to
     for made_up in (0.3, 77.0):
         sample = Windows(windows.masked_fill(mask[:, None], made_up), mask=mask)
         discriminator.zero_grad()
-        loss = discriminator_loss(discriminator, sample, sample, sample)
+        loss = discriminator_loss(discriminator, sample, sample, sample, generator=generator)
         torch.stack(list(loss.parts.values())).sum().backward()
         gradients = [parameter.grad.clone() for parameter in discriminator.parameters() if parameter.grad is not None]
         results.append([discriminator.logits(*sample[:3]), *loss.parts.values(), *gradients])
@@ -64,7 +64,7 @@ def test_the_gradient_penalty_asks_nothing_of_what_is_left_out(generator: torch.
     windows = torch.randn(6, 1, 3, generator=generator)
     everything = torch.ones(6, 3, dtype=torch.bool)
     sample = Windows(windows, mask=everything)
-    assert discriminator_loss(discriminator, sample, sample, sample).parts["gradient_penalty"] == 0
+    assert discriminator_loss(discriminator, sample, sample, sample, generator=generator).parts["gradient_penalty"] == 0
 
 
 def test_a_normaliser_learns_from_what_is_there(generator: torch.Generator) -> None:

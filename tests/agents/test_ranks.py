@@ -14,10 +14,12 @@ from murmillo.agents.common import checkpoint
 from tests.agents.toy import equal, small_ase
 from tests.agents.toy_ranks import run_as, train_alone
 
+HINGE = replace(small_ase().discriminator, loss="hinge")
 RUNS: dict[str, tuple[str, dict[str, Any]]] = {
     "ase": ("ase", {"ppo": replace(small_ase().ppo, noise_correlation=0.5)}),
     "case": ("case", {"discriminator": small_ase().discriminator}),  # without dropout
     "calm": ("calm", {}),
+    "ase_hinge": ("ase", {"discriminator": HINGE}),
     "calm_shuffled": ("calm", {"negatives": "shuffled"}),
     "case_dropout": ("case", {}),
 }
@@ -34,7 +36,7 @@ def shared(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.parametrize("name", ["ase", "case", "calm", "calm_shuffled"])
+@pytest.mark.parametrize("name", [name for name in RUNS if name != "case_dropout"])
 def test_two_processes_learn_what_one_does(name: str, shared: Path, tmp_path: Path) -> None:
     train_alone(tmp_path, *RUNS[name])
     one, two = (checkpoint.load(folder / "whole") for folder in (tmp_path, shared / name))
