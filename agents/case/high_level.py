@@ -95,7 +95,7 @@ class HybridPolicy(GaussianPolicy):
             condition_dim=condition_dim,
             style_hidden=config.style_hidden if condition_dim else (),
             mean_init_scale=config.mean_init_scale,
-            learn_std=config.learn_std,
+            learn_std=config.std_learning_rate > 0,
         )
         self.labels = labels
         self.gumbel = gumbel

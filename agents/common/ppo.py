@@ -42,8 +42,8 @@ class PPOConfig:
         hidden: sizes of the hidden layers of policy and critic.
         style_hidden: hidden sizes of the style network before the policy's condition; empty for none.
         std: the policy's standard deviation; the paper's variance is 0.0025.
-        learn_std: whether that is only where it begins, one learned for each action dimension. AdaptNet's is always
-            learned, by state.
+        std_learning_rate: Adam's step for its logarithm, one for each action dimension; 0 keeps it. Alone they hardly
+            move at the rates of weights. AdaptNet's depends on the state and always learns, as weights.
         noise_correlation: between the noise of one action and the next; the papers' noise is white.
         mean_init_scale: factor on the initial weights of the policy's last layer.
         policy_learning_rate: Adam's step for the policy.
@@ -63,7 +63,7 @@ class PPOConfig:
     hidden: tuple[int, ...] = (1024, 1024, 512)
     style_hidden: tuple[int, ...] = (512, 256)
     std: float = 0.05
-    learn_std: bool = False
+    std_learning_rate: float = 0.0
     noise_correlation: float = 0.0
     mean_init_scale: float = 1.0
     policy_learning_rate: float = 2e-5
@@ -79,7 +79,7 @@ class PPOConfig:
 
     def __post_init__(self) -> None:
         check_at_least(1, self, "agent.ppo", "epochs", "minibatch")
-        check_at_least(0, self, "agent.ppo", "policy_learning_rate", "value_learning_rate")
+        check_at_least(0, self, "agent.ppo", "policy_learning_rate", "value_learning_rate", "std_learning_rate")
         check_at_least(0, self, "agent.ppo", "mean_init_scale", "bound_weight", "value_weight")
         check_above_zero(self, "agent.ppo", "std", "clip", "max_grad_norm", "target_kl", "lead_kl")
         if not 0 <= self.noise_correlation < 1:
@@ -117,7 +117,7 @@ class ActorCritic(nn.Module):
             condition_dim=condition_dim,
             style_hidden=config.style_hidden if condition_dim else (),
             mean_init_scale=config.mean_init_scale,
-            learn_std=config.learn_std,
+            learn_std=config.std_learning_rate > 0,
         )
         self.critic = critic or Critic(state_dim, condition_dim, config.hidden, generator)
         self.state_normalizer: Any = state_normalizer or RunningNormalizer((state_dim,))
@@ -164,9 +164,12 @@ class PPO:
         """
         self.model = model
         self.config = config
+        std = [parameter for name, parameter in model.policy.named_parameters() if name == "log_std"]
+        weights = [parameter for name, parameter in model.policy.named_parameters() if name != "log_std"]
         self.optimizer = adam(
-            ([*model.policy.parameters(), *condition_parameters], config.policy_learning_rate),
+            ([*weights, *condition_parameters], config.policy_learning_rate),
             (model.critic.parameters(), config.value_learning_rate),
+            (std, config.std_learning_rate),
         )
         self._pace = 1.0
         """Of the policy: its learning rate as a multiple of the config's."""

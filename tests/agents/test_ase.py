@@ -72,7 +72,7 @@ def test_diversity_is_asked_of_two_different_latents(make: Callable, generator: 
 @pytest.mark.parametrize("make", [make_ase, make_case])
 def test_diversity_does_not_ask_for_noise(make: Callable, generator: torch.Generator) -> None:
     """By more of it two skills would differ less in units of it: the paper's form must not learn that."""
-    agent = make(PointMass(3), generator, diversity="kl", ppo=replace(small_ase().ppo, learn_std=True))
+    agent = make(PointMass(3), generator, diversity="kl", ppo=replace(small_ase().ppo, std_learning_rate=1e-3))
     rows = {"state": torch.randn(64, 4, generator=generator), "label": torch.zeros(64, dtype=torch.int64)}
     batch = Minibatch(rows, Part(ALONE, 64))
     batch["latent"] = sample_sphere(64, 4, generator)

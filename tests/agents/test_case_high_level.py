@@ -49,7 +49,7 @@ def test_log_probabilities_are_the_labels_plus_the_latents() -> None:
 
 def test_the_latents_std_is_learned_if_that_is_asked_for() -> None:
     assert "log_std" not in dict(policy().named_parameters())
-    assert "log_std" in dict(policy(learn_std=True).named_parameters())
+    assert "log_std" in dict(policy(std_learning_rate=1e-3).named_parameters())
 
 
 def test_the_relaxed_labels_density_is_that_of_the_concrete_distribution(generator: torch.Generator) -> None:

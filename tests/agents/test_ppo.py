@@ -116,16 +116,17 @@ def test_the_rate_is_led_to_the_kl_that_is_asked_for(generator: torch.Generator)
     assert rates[1e6][-1] == pytest.approx(1.0)
 
 
-@pytest.mark.parametrize("learn_std", [False, True])
-def test_the_noise_of_a_policy_that_is_always_right_shrinks_if_it_is_learned(learn_std: bool) -> None:
-    generator, ppo = torch.Generator().manual_seed(1), make(learn_std=learn_std)
+@pytest.mark.parametrize("rate", [0.0, 1e-2])
+def test_the_noise_of_a_policy_that_is_always_right_shrinks_if_it_is_learned(rate: float) -> None:
+    """At its own rate: the weights hardly move here."""
+    generator, ppo = torch.Generator().manual_seed(1), make(std_learning_rate=rate, policy_learning_rate=1e-9)
     for _ in range(10):
         batch = rollout(ppo, generator)
         mean = ppo.model.policy(ppo.model.state_normalizer(batch["state"]))
         batch["advantage"] = normalise_advantage(-(batch["action"] - mean.detach()).square().sum(-1))
         ppo.update(batch, generator)
     std = ppo.model.policy.log_std.exp()
-    assert (std < 0.18).all() if learn_std else (std == torch.tensor(0.2).log().exp()).all()
+    assert (std < 0.18).all() if rate else (std == torch.tensor(0.2).log().exp()).all()
 
 
 def test_a_led_rate_goes_on_where_it_was(generator: torch.Generator) -> None:
