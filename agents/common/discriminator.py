@@ -138,7 +138,9 @@ class Discriminator(nn.Module):
         sizes = [frames * state_dim + self.condition.inputs, *config.hidden]
         self.trunk = trunk or mlp(sizes, generator, config.dropout, ranks=ranks)
         self.dropout = Dropout(config.dropout, generator, ranks)
-        self.head = linear(config.hidden[-1], self.condition.outputs, generator, bound=1.0)
+        # a hinge begins about as steep as its penalty wants it, which else takes a million samples to get it there
+        bound = config.slope if config.loss == "hinge" else 1.0
+        self.head = linear(config.hidden[-1], self.condition.outputs, generator, bound=bound)
         self.eval()
 
     def observe(self, window: Tensor, mask: Tensor | None = None) -> None:

@@ -134,6 +134,15 @@ def test_the_hinges_penalty_asks_nothing_of_what_is_left_out(generator: torch.Ge
     assert parts["gradient_penalty"].item() == pytest.approx(0.0, abs=1e-7)
 
 
+def test_a_hinge_begins_about_as_steep_as_it_is_to_be(generator: torch.Generator) -> None:
+    for slope in (0.0625, 0.5):
+        config = DiscriminatorConfig(hidden=(256, 256), loss="hinge", slope=slope, gradient_penalty=1.0)
+        discriminator = Discriminator(10, 120, config, generator)
+        agent, demonstration = (Windows(torch.randn(64, 10, 120, generator=generator)) for _ in range(2))
+        parts = discriminator_loss(discriminator, agent, agent, demonstration, generator=generator).parts
+        assert parts["gradient_penalty"] < 1.0  # between no slope and twice the one that is asked for
+
+
 def linear_one(weight: Tensor, config: DiscriminatorConfig, generator: torch.Generator) -> Discriminator:
     """Logits w x of windows of one frame, which are not scaled."""
     discriminator = Discriminator(1, 3, config, generator, trunk=nn.Sequential(nn.Flatten()))
