@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
-from murmillo.agents.adaptnet.base import Base
 from murmillo.agents.adaptnet.config import AdaptNetConfig
+from murmillo.agents.common.base import Base
 from murmillo.agents.common.errors import AgentError
 from murmillo.cli import foundations, runs
 from murmillo.cli.adaptation.words import AGENT, is_adaptnet_run
