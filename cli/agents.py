@@ -13,6 +13,8 @@ from murmillo.agents.calm.config import CALMConfig
 from murmillo.agents.case.agent import CASE
 from murmillo.agents.case.config import CASEConfig
 from murmillo.agents.common import checkpoint
+from murmillo.agents.common.base import Base
+from murmillo.agents.common.heights import HEIGHTS
 from murmillo.agents.common.ranks import ALONE, Ranks
 from murmillo.envs import HumanoidVectorEnv
 from murmillo.envs.observations import state_dim
@@ -41,15 +43,18 @@ AGENTS = {
 
 
 def make_agent(
-    name: str, config: Any, env: HumanoidVectorEnv, seed: int, ranks: Ranks = ALONE
+    name: str, config: Any, env: HumanoidVectorEnv, seed: int, ranks: Ranks = ALONE, base: Base | None = None
 ) -> tuple[Any, torch.Generator]:
     """The agent as it is before training, and the generator that it draws from: equal for equal arguments."""
     generator = torch.Generator(env.device).manual_seed(seed)
-    return AGENTS[name].make(env, env.demonstrations, config, generator, ranks=ranks), generator
+    return AGENTS[name].make(env, env.demonstrations, config, generator, base, ranks=ranks), generator
 
 
-def checkpoint_meta(name: str, config: Any, env: HumanoidVectorEnv) -> dict[str, Any]:
-    """What a checkpoint must share with the environment and the agent that it is loaded into."""
+def checkpoint_meta(name: str, config: Any, env: HumanoidVectorEnv, *, adapted: bool = False) -> dict[str, Any]:
+    """What a checkpoint must share with the environment and the agent that it is loaded into.
+
+    Uneven ground is seen by adaptations alone, and only they ask whether it is shown.
+    """
     return {
         "agent": name,
         "character": env.config.character,
@@ -57,6 +62,7 @@ def checkpoint_meta(name: str, config: Any, env: HumanoidVectorEnv) -> dict[str,
         "action_dim": _action_dim(env),
         "window": config.window,
         **({"skills": list(env.skills)} if AGENTS[name].labelled else {}),
+        **({"adapted": True, HEIGHTS: HEIGHTS in env.single_observation_space.spaces} if adapted else {}),  # type: ignore[attr-defined]  # it is a Dict
     }
 
 
@@ -71,9 +77,19 @@ def load_player(name: str, config: Any, env: HumanoidVectorEnv, seed: int, folde
     Raises:
         AgentError: the checkpoint is damaged, or another character's or agent's.
     """
-    agent, _ = make_agent(name, config, env, seed)
     saved = checkpoint.load(folder)
-    checkpoint.check_compatible(saved["meta"], checkpoint_meta(name, config, env))
+    base = Base.within(saved["agent"])
+    checkpoint.check_compatible(saved["meta"], checkpoint_meta(name, config, env, adapted=base is not None))
+    agent, _ = make_agent(name, config, env, seed, base=base)
     own = agent.state_dict()
     agent.load_state_dict({**saved["agent"], **{key: own[key] for key in ("latents", "replay") if key in own}})
     return agent
+
+
+def load_untrained(name: str, config: Any, env: HumanoidVectorEnv, seed: int, folder: Path) -> Any:
+    """The agent of a checkpoint as it was before training: of an adaptation, its base.
+
+    Raises:
+        AgentError: the checkpoint is damaged.
+    """
+    return make_agent(name, config, env, seed, base=Base.within(checkpoint.load(folder)["agent"]))[0]
