@@ -180,6 +180,19 @@ def test_uneven_ground_is_seen_by_policy_and_critic(kind: str, generator: torch.
     assert {"policy.adapters.0.control.layers.0.weight", "critic.control.layers.0.weight"} <= moved
 
 
+def test_the_critic_looks_at_the_states_as_they_are_now(kind: str, generator: torch.Generator) -> None:
+    """Through the normaliser that learns on; the frozen one is the policy's alone."""
+    env, obs = observe()
+    agent = make_adapted(kind, env, generator)
+    extras = agent.act(obs).extras
+    own, new = agent.model.state_normalizer.normalizers
+    before = agent.value(obs, extras)
+    own.mean += 1.0
+    assert torch.equal(agent.value(obs, extras), before)
+    new.mean += 1.0
+    assert not torch.allclose(agent.value(obs, extras), before, atol=1e-3)
+
+
 def test_penalties_by_hand(kind: str, generator: torch.Generator) -> None:
     agent = make_adapted(kind, PointMass(6, skills=SKILLS), generator, injection_penalty=0.5, weight_decay=0.1)
     policy = agent.model.policy

@@ -19,6 +19,8 @@ RUNS: dict[str, tuple[str, dict[str, Any]]] = {
     "case": ("case", {"discriminator": small_ase().discriminator}),  # without dropout
     "calm": ("calm", {}),
     "calm_shuffled": ("calm", {"negatives": "shuffled"}),
+    "case_adapted": ("case", {"discriminator": small_ase().discriminator, "adapted": True}),
+    "calm_adapted": ("calm", {"adapted": True}),
     "case_dropout": ("case", {}),
 }
 
@@ -34,7 +36,7 @@ def shared(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.parametrize("name", ["ase", "case", "calm", "calm_shuffled"])
+@pytest.mark.parametrize("name", [name for name in RUNS if name != "case_dropout"])
 def test_two_processes_learn_what_one_does(name: str, shared: Path, tmp_path: Path) -> None:
     train_alone(tmp_path, *RUNS[name])
     one, two = (checkpoint.load(folder / "whole") for folder in (tmp_path, shared / name))

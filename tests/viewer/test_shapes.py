@@ -56,9 +56,9 @@ def test_meshes_have_the_sizes_of_their_geoms_and_look_outward(model: mujoco.MjM
 def test_uneven_ground_is_where_the_engine_has_it() -> None:
     terrain = Terrain(TerrainConfig(kind="mixed", tiles=1))
     (ground,) = [shape for shape in shapes_of(load_character("humanoid", terrain.edit).model) if shape.body == 0]
-    corners = torch.from_numpy(ground.mesh.vertices)
+    corners = torch.from_numpy(np.array(ground.mesh.vertices))
     np.testing.assert_allclose(ground.mesh.vertices[:, 2], terrain.height(corners), atol=1e-6)
-    middles = torch.from_numpy(ground.mesh.triangles_center)
+    middles = torch.from_numpy(np.array(ground.mesh.triangles_center))
     np.testing.assert_allclose(ground.mesh.triangles_center[:, 2], terrain.height(middles), atol=1e-6)
     assert np.ptp(ground.mesh.vertices[:, 2]) > 0.1
     assert (ground.mesh.face_normals[:, 2] > 0.0).all()
