@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import torch
+from gymnasium import spaces
 
 from murmillo.agents.ase.agent import ASE
 from murmillo.agents.ase.config import ASEConfig
@@ -17,7 +18,6 @@ from murmillo.agents.common.base import Base
 from murmillo.agents.common.heights import HEIGHTS
 from murmillo.agents.common.ranks import ALONE, Ranks
 from murmillo.envs import HumanoidVectorEnv
-from murmillo.envs.observations import state_dim
 
 
 class AgentKind(NamedTuple):
@@ -55,14 +55,16 @@ def checkpoint_meta(name: str, config: Any, env: HumanoidVectorEnv, *, adapted: 
 
     Uneven ground is seen by adaptations alone, and only they ask whether it is shown.
     """
+    seen = env.single_observation_space
+    assert isinstance(seen, spaces.Dict)
     return {
         "agent": name,
         "character": env.config.character,
-        "state_dim": state_dim(env.character),
+        "state_dim": spaces.flatdim(seen["state"]),
         "action_dim": _action_dim(env),
         "window": config.window,
         **({"skills": list(env.skills)} if AGENTS[name].labelled else {}),
-        **({"adapted": True, HEIGHTS: HEIGHTS in env.single_observation_space.spaces} if adapted else {}),  # type: ignore[attr-defined]  # it is a Dict
+        **({"adapted": True, HEIGHTS: HEIGHTS in seen.spaces} if adapted else {}),
     }
 
 

@@ -186,10 +186,11 @@ def adapted(
         origin = {name: saved["meta"][name] for name in (SETTING, f"{SETTING}_digest")}
         return Base.within(saved["agent"]), origin
     base = find(config.base)
+    policy = base.policy(SETTING, env.character)
     here = checkpoint_meta(base.kind, config.agent, env)
     del here["action_dim"]  # joints may be locked
     try:
         checkpoint.check_compatible(checkpoint.load(base.folder / runs.LAST)["meta"], here)
     except AgentError as error:
         raise CommandError(f"base={base.word}: {error}; keep its clips and its character") from None
-    return base.policy(SETTING, env.character), foundations.identity(SETTING, base.folder)
+    return policy, foundations.identity(SETTING, base.folder)

@@ -12,9 +12,9 @@ import pytest
 import torch
 
 from murmillo.agents.common.adapter import AdaptedPolicy
+from murmillo.cli import bases, gl, play, runs
 from murmillo.cli import config as configuration
-from murmillo.cli import gl, play, runs
-from murmillo.cli.agents import load_player, load_untrained
+from murmillo.cli.agents import load_player, load_untrained, make_agent
 from murmillo.cli.bases import TARGETS, compose_adaptation
 from murmillo.cli.checks import check_settings
 from murmillo.cli.main import main
@@ -79,6 +79,23 @@ def test_what_follows_from_other_settings_follows_again(adapted: Path) -> None:
     assert (config.env.motions, config.env.clips, config.env.threads) == ("elsewhere", (), 2)
     assert config.env.friction == (0.3, 0.5)
     assert compose_adaptation([*words, "clips=[run_forward]"]).env.clips == ("run_forward",)
+
+
+def test_a_joint_may_be_locked_too(adapted: Path) -> None:
+    """The right knee is one of 31 actions; the policy goes on seeing it."""
+    words = ["env.body.shape=''", "env.body.locked=[right_knee]"]
+    config = compose_adaptation([f"base={adapted}/base", "to=body", *words])
+    env = HumanoidVectorEnv(2, config.env)
+    try:
+        base, origin = bases.adapted(config, env)
+        assert base is not None
+        assert base.actions == 30
+        assert origin["base"] == str(adapted / "base")
+        agent, _ = make_agent("case", config.agent, env, 1, base=base)
+        obs = {name: torch.as_tensor(value) for name, value in env.reset(seed=3)[0].items()}
+        assert agent.act(obs).action.shape == (2, 30)
+    finally:
+        env.close()
 
 
 # --- runs ------------------------------------------------------------------------------------------------------------
@@ -246,5 +263,8 @@ def test_what_is_no_base(murmillo: Murmillo, own: Path) -> None:
         (own / "other").mkdir(exist_ok=True)
         (own / "other" / "config.yaml").write_text(f"choices:\n  {kind}\n")
         assert_refused(murmillo("train", "base=runs/other", "to=friction"), "base=runs/other", said)
+    tensors = own / "base" / "checkpoints" / "last" / "tensors.safetensors"
+    tensors.write_bytes(tensors.read_bytes()[:99])
+    assert_refused(murmillo("train", "base=runs/base", "to=friction", *SHORT), "base=runs/base", "is damaged")
     shutil.rmtree(own / "base" / "checkpoints")
     assert_refused(murmillo("train", "base=runs/base", "to=friction"), "base=runs/base", "has no checkpoint")
