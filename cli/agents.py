@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import torch
+from gymnasium import spaces
 
 from murmillo.agents.ase.agent import ASE
 from murmillo.agents.ase.config import ASEConfig
@@ -13,9 +14,10 @@ from murmillo.agents.calm.config import CALMConfig
 from murmillo.agents.case.agent import CASE
 from murmillo.agents.case.config import CASEConfig
 from murmillo.agents.common import checkpoint
+from murmillo.agents.common.base import Base
+from murmillo.agents.common.heights import HEIGHTS
 from murmillo.agents.common.ranks import ALONE, Ranks
 from murmillo.envs import HumanoidVectorEnv
-from murmillo.envs.observations import state_dim
 
 
 class AgentKind(NamedTuple):
@@ -41,22 +43,28 @@ AGENTS = {
 
 
 def make_agent(
-    name: str, config: Any, env: HumanoidVectorEnv, seed: int, ranks: Ranks = ALONE
+    name: str, config: Any, env: HumanoidVectorEnv, seed: int, ranks: Ranks = ALONE, base: Base | None = None
 ) -> tuple[Any, torch.Generator]:
     """The agent as it is before training, and the generator that it draws from: equal for equal arguments."""
     generator = torch.Generator(env.device).manual_seed(seed)
-    return AGENTS[name].make(env, env.demonstrations, config, generator, ranks=ranks), generator
+    return AGENTS[name].make(env, env.demonstrations, config, generator, base, ranks=ranks), generator
 
 
-def checkpoint_meta(name: str, config: Any, env: HumanoidVectorEnv) -> dict[str, Any]:
-    """What a checkpoint must share with the environment and the agent that it is loaded into."""
+def checkpoint_meta(name: str, config: Any, env: HumanoidVectorEnv, *, adapted: bool = False) -> dict[str, Any]:
+    """What a checkpoint must share with the environment and the agent that it is loaded into.
+
+    Uneven ground is seen by adaptations alone, and only they ask whether it is shown.
+    """
+    seen = env.single_observation_space
+    assert isinstance(seen, spaces.Dict)
     return {
         "agent": name,
         "character": env.config.character,
-        "state_dim": state_dim(env.character),
+        "state_dim": spaces.flatdim(seen["state"]),
         "action_dim": _action_dim(env),
         "window": config.window,
         **({"skills": list(env.skills)} if AGENTS[name].labelled else {}),
+        **({"adapted": True, HEIGHTS: HEIGHTS in seen.spaces} if adapted else {}),
     }
 
 
@@ -71,9 +79,19 @@ def load_player(name: str, config: Any, env: HumanoidVectorEnv, seed: int, folde
     Raises:
         AgentError: the checkpoint is damaged, or another character's or agent's.
     """
-    agent, _ = make_agent(name, config, env, seed)
     saved = checkpoint.load(folder)
-    checkpoint.check_compatible(saved["meta"], checkpoint_meta(name, config, env))
+    base = Base.within(saved["agent"])
+    checkpoint.check_compatible(saved["meta"], checkpoint_meta(name, config, env, adapted=base is not None))
+    agent, _ = make_agent(name, config, env, seed, base=base)
     own = agent.state_dict()
     agent.load_state_dict({**saved["agent"], **{key: own[key] for key in ("latents", "replay") if key in own}})
     return agent
+
+
+def load_untrained(name: str, config: Any, env: HumanoidVectorEnv, seed: int, folder: Path) -> Any:
+    """The agent of a checkpoint as it was before training: of an adaptation, its base.
+
+    Raises:
+        AgentError: the checkpoint is damaged.
+    """
+    return make_agent(name, config, env, seed, base=Base.within(checkpoint.load(folder)["agent"]))[0]

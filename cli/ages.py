@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from murmillo.cli import runs, tables
-from murmillo.cli.agents import load_player, make_agent
+from murmillo.cli.agents import load_player, load_untrained
 from murmillo.cli.config import TrainConfig
 from murmillo.cli.devices import for_playing
 from murmillo.cli.encodings import concentration
@@ -27,7 +27,7 @@ def measure_ages(config: TrainConfig, folder: Path, worlds: int, seed: int = 123
     try:
         made_of = (config.choices["agent"], config.agent, env, config.seed)
         judge = load_player(*made_of, folder / runs.LAST)
-        players = {"untrained": make_agent(*made_of)[0]}
+        players = {"untrained": load_untrained(*made_of, folder / runs.LAST)}
         if (folder / runs.WARM_STARTED).exists():
             players["warm_started"] = load_player(*made_of, folder / runs.WARM_STARTED)
         players["trained"] = load_player(*made_of, folder / runs.LAST)

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from operator import attrgetter
 from typing import Any
 
+from murmillo.agents.common.adaptation import AdaptationConfig
 from murmillo.cli.config import TrainConfig
 from murmillo.cli.errors import CommandError
 from murmillo.cli.seeds import check_seed
@@ -35,11 +36,22 @@ def check_settings(config: TrainConfig) -> None:
     """
     check_training(config, _LEAST)
     check_window(config)
+    if config.base is None:
+        _check_nothing_adapts(config.agent)
     if config.runner.reward_weights.get("residual") and not config.env.residual_force:
         raise CommandError(
             f"runner.reward_weights.residual={config.runner.reward_weights['residual']}: there are no residual forces "
             "to be sparing with; set env.residual_force (50 N are the published code's), or drop this weight"
         )
+
+
+def _check_nothing_adapts(agent: AdaptationConfig) -> None:
+    """Refuse settings of an adapter where there is none."""
+    for field in dataclasses.fields(AdaptationConfig):
+        if getattr(agent, field.name) != getattr(AdaptationConfig(), field.name):
+            raise CommandError(
+                f"agent.{field.name}: what learns from nothing has no adapter; add base=runs/<name> to=…, or drop this"
+            )
 
 
 def check_window(config: Any) -> None:

@@ -23,7 +23,7 @@ from murmillo.cli.schema import build, schema_of
 from murmillo.cli.translate import command_error, unreadable, wrong_name
 from murmillo.envs import EnvConfig
 
-GROUPS = ("agent", "budget", "ablation")
+GROUPS = ("agent", "budget", "ablation", "to")
 RESUMABLE = ("run.", "runner.", "threads=", "matmul=")
 """What may be set anew when a run is taken up again; everything else is the run's own."""
 
@@ -60,6 +60,7 @@ class TrainConfig:
     Attributes:
         agent: the chosen agent's configuration.
         choices: the files of `conf/` that this was put together from, by group.
+        base: folder of the run whose policy is adapted; None learns from nothing. Its settings are those of this run.
         motions: "builtin", a folder of clips or one file.
         clips: names of those of them that are learned, or patterns such as "walk_*"; empty for all.
         skills: how many labels the clips must have; None takes what they have.
@@ -77,6 +78,7 @@ class TrainConfig:
     warm_start: WarmStartConfig = field(default_factory=WarmStartConfig)
     run: RunConfig = field(default_factory=RunConfig)
     choices: dict[str, str] = field(default_factory=dict)
+    base: str | None = None
     motions: str = "builtin"
     clips: tuple[str, ...] = ()
     skills: int | None = None

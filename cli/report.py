@@ -29,7 +29,7 @@ def write(folder: Path) -> Path:
         scalars,
         what=_what(config, scalars),
         found=[
-            _ages(measures),
+            _ages(measures, adapted="to" in config.choices),
             obedience.section(measures, runs.read_json(folder / runs.SKILLS, {})),
             encodings.section(measures),
             evaluation.section(runs.read_json(folder / runs.METRICS)),
@@ -127,8 +127,9 @@ def _what(config: Any, scalars: Scalars) -> str:
     choices, (samples, minutes, rate) = config.choices, Effort.of(scalars)
     chosen = f" ({', '.join(config.clips)})" if config.get("clips") else ""
     changed = "" if choices.ablation == "none" else f" with the ablation `{choices.ablation}`"
+    learned = f"of `{config.base}` was adapted to `{choices.to}` with" if "to" in choices else "learned from"
     return (
-        f"`{choices.agent}`{changed} learned from the clips `{config.motions}`{chosen} with the budget "
+        f"`{choices.agent}`{changed} {learned} the clips `{config.motions}`{chosen} with the budget "
         f"`{choices.budget}`, seed {config.seed}: {samples:,} samples (control steps of 1/30 s, "
         f"{samples / 30 / 3600:.1f} simulated hours) in {minutes:.1f} minutes, {rate:,.0f} samples/s, "
         f"in {config.num_envs} worlds."
@@ -171,8 +172,8 @@ def notices(found: list[dict[str, Any]]) -> str:
     return "\n".join(["## What to look at", "", *lines, "", hint])
 
 
-def _ages(measures: dict[str, Any]) -> str:
-    """The table of the policy at three ages."""
+def _ages(measures: dict[str, Any], adapted: bool) -> str:
+    """The table of the policy at its ages; before training an adapted one is its base."""
     if not measures:
         return ""
     rows = [
@@ -186,6 +187,7 @@ def _ages(measures: dict[str, Any]) -> str:
         "Each policy played one episode in each world: started in a clip, with its mean action and random latents, "
         "until it fell or the clock ran out. The style score is how much like a clip the *trained* "
         "discriminator finds the motion, 0 to 1; one judge for all makes the ages comparable.",
+        *(["", "Before training, an adapted policy acts as its base: that row is the base, in this world."] * adapted),
         "",
         "| policy | episode length [steps] | fall rate | style score | episodes | steps |",
         "|---|---:|---:|---:|---:|---:|",
@@ -271,7 +273,7 @@ def _going_on(folder: Path, config: Any, scalars: Scalars) -> str:
         "# train this run on, for an hour at most",
         f"murmillo train run.resume={run} runner.max_minutes=60 runner.samples={max(20_000_000, 2 * samples)}",
     ]
-    if config.choices.budget == "smoke":
+    if config.choices.budget == "smoke" and "to" not in config.choices:
         clips = "" if config.motions == "builtin" else f" {shlex.quote(f'motions={config.motions}')}"
         clips += " " + shlex.quote(f"clips=[{','.join(config.clips)}]") if config.get("clips") else ""
         lines += [

@@ -4,7 +4,7 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
-from murmillo.cli.adaptation.words import are_about_adaptnet
+from murmillo.cli.adaptation.words import adapt_skills, are_about_adaptnet
 from murmillo.cli.errors import CommandError
 from murmillo.cli.tasks.words import are_about_a_task
 
@@ -21,6 +21,7 @@ murmillo train: train an agent on motion clips
   torchrun --nproc-per-node=4 -m murmillo.cli.train num_envs=16384    one run by four processes (docs/scaling.md)
   murmillo train task=location low=runs/<name>       a task, by the skills of a trained agent
   murmillo train task=location low=none              the same task without an agent below
+  murmillo train base=runs/<name> to=friction        adapt a trained agent of ase, calm or case to another world
   murmillo train agent=adaptnet                      a humanoid that walks to places, the base of adaptations
   murmillo train agent=adaptnet stage=adapt base=runs/<name> to=style clips=[jaunty]
 
@@ -51,6 +52,11 @@ With task=… a high-level policy learns to choose what the agent of another run
   budget     smoke (10 minutes), laptop (2 hours), paper
   run.video, run.name, run.root, run.resume, seed, num_envs, threads: as above
 
+With base=… the policy of a run of ase, calm or case is adapted; latents and labels go on meaning what they meant:
+
+  to         friction, terrain, body or pushes       env.friction=[0.35,0.35] and the like say more (docs/adaptnet.md)
+  agent.adapter.rank, agent.injection_penalty and agent.weight_decay are of the adapter; all else is as in the base
+
 With agent=adaptnet a policy learns to go to places in the style of the clips, and is then adapted (docs/adaptnet.md):
 
   stage      base or adapt                           a policy from nothing, or an adaptation of base=runs/<name>
@@ -77,6 +83,8 @@ def run(words: list[str]) -> int:
     if are_about_a_task(settings):
         return _train_task(settings, multirun=bool(flags))
     settings = [word for word in settings if not word.startswith("task=")]
+    if adapt_skills(settings):
+        return _adapt_skills(settings, multirun=bool(flags))
     if flags:
         from murmillo.cli.sweep import sweep
 
@@ -109,6 +117,14 @@ def _train_adaptnet(words: list[str], multirun: bool) -> int:
     from murmillo.cli.adaptation.training import train
 
     return _train_all(compose_adaptnet, train, words, multirun)
+
+
+def _adapt_skills(words: list[str], multirun: bool) -> int:
+    """One adaptation of a policy of ASE, CALM or C·ASE, or one after the other for each combination of values."""
+    from murmillo.cli.bases import compose_adaptation
+    from murmillo.cli.training import train
+
+    return _train_all(compose_adaptation, train, words, multirun)
 
 
 def _train_all(compose: Callable[[list[str]], Any], train: Callable[..., int], words: list[str], multirun: bool) -> int:

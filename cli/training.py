@@ -19,8 +19,8 @@ from murmillo.agents.common.logger import Logger
 from murmillo.agents.common.ranks import ALONE, Ranks
 from murmillo.agents.common.runner import Runner
 from murmillo.agents.common.warm_start import warm_start
+from murmillo.cli import bases, launch, report, runs, versions
 from murmillo.cli import config as configuration
-from murmillo.cli import launch, report, runs, versions
 from murmillo.cli.agents import checkpoint_meta, make_agent
 from murmillo.cli.ages import measure_ages
 from murmillo.cli.checks import check_clips, check_settings
@@ -57,11 +57,14 @@ def train(config: TrainConfig, suffix: str = "", ranks: Ranks = ALONE) -> int:
 
     def check() -> TrainConfig:
         check_settings(config)
+        if config.run.resume is None:  # what was begun has its base in its own checkpoint
+            bases.check(config)
         check_clips(config)
         return config
 
     launch.agreed(ranks, check)
-    name = config.run.name or runs.default_name(choices["agent"], choices["budget"], config.seed, suffix)
+    kind = choices["agent"] if config.base is None else f"{choices['agent']}-{choices['to']}"
+    name = config.run.name or runs.default_name(kind, choices["budget"], config.seed, suffix)
     folder, resuming = launch.open_run(config, name, ranks)
     torch.set_float32_matmul_precision(MATMUL[config.matmul])
     env = HumanoidVectorEnv(config.num_envs // ranks.size, for_training(launch.share_threads(config)))
@@ -109,25 +112,29 @@ def describe(folder: Path, config: Any) -> None:
 
 
 def _train(config: TrainConfig, env: HumanoidVectorEnv, folder: Path, resuming: bool, ranks: Ranks) -> int:
-    agent, generator = make_agent(config.choices["agent"], config.agent, env, config.seed, ranks)
+    kind = config.choices["agent"]
+    base, origin = bases.adapted(config, env, folder if resuming else None)
+    agent, generator = make_agent(kind, config.agent, env, config.seed, ranks, base)
     runner = Runner(
         env,
         agent,
         config.runner,
         generator,
         folder / runs.LAST,
-        meta=checkpoint_meta(config.choices["agent"], config.agent, env),
+        meta=checkpoint_meta(kind, config.agent, env, adapted=base is not None),
         logger=Logger(folder) if ranks.first else None,
         ranks=ranks,
     )
     if resuming:
         runner.load(folder / runs.LAST)
     terms = dataclasses.asdict(terms_of(env.library.clips))
-    runner.meta |= {"terms": terms}  # after loading: they are kept with a checkpoint, and need not be those here
+    # after loading: they are kept with a checkpoint, and need not be those here
+    runner.meta |= {"terms": terms, **origin}
     if ranks.first:
         runs.write_json(folder / runs.TERMS, terms)
         runs.write_json(folder / runs.CLIPS, clip_digests(env.library.clips))
-    opening = f"{folder}: {config.choices['agent']} on {len(env.library.clips)} clips, {launch.worlds(config, ranks)}"
+    what = kind if base is None else f"{kind} of {config.base}, adapted to {config.choices['to']},"
+    opening = f"{folder}: {what} on {len(env.library.clips)} clips, {launch.worlds(config, ranks)}"
     keep = () if config.run.keep_every is None else (Keeper(runner, agent, config.run.keep_every, folder),)
 
     def begin(progress: Progress) -> None:

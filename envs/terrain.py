@@ -143,7 +143,12 @@ def make_terrain(config: TerrainConfig) -> Terrain | None:
         SuiteError: a setting that cannot be, or obstacles that leave no room to stand.
     """
     _check(config)
-    return Terrain(config) if config.kind != "flat" or config.obstacles else None
+    return Terrain(config) if is_uneven(config) else None
+
+
+def is_uneven(config: TerrainConfig) -> bool:
+    """Whether there is a map of heights to be seen."""
+    return config.kind != "flat" or config.obstacles > 0
 
 
 def _check(config: TerrainConfig) -> None:

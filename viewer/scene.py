@@ -38,8 +38,14 @@ class Scene:
         scene = server.scene
         scene.configure_environment_map("park", environment_intensity=0.5)
         self._world = scene.add_frame(_WORLD, show_axes=False)
+        shapes = shapes_of(model)
+        ground = [shape for shape in shapes if shape.body == 0]
+        lowest = min((shape.mesh.bounds[0][2] for shape in ground), default=0.0)
+        if ground:
+            scene.add_glb(f"{_WORLD}/ground", glb(ground))
         scene.add_grid(
             f"{_WORLD}/floor",
+            position=(0.0, 0.0, lowest),  # beyond the rim of uneven ground
             infinite_grid=True,
             fade_distance=45.0,
             cell_size=1.0,
@@ -50,7 +56,6 @@ class Scene:
             plane_opacity=1.0,
             shadow_opacity=0.35,
         )
-        shapes = shapes_of(model)
         self._bodies = [
             scene.add_glb(f"{_WORLD}/{model.body(i).name}", glb([shape for shape in shapes if shape.body == i]))
             for i in range(1, model.nbody)

@@ -54,12 +54,12 @@ def glb(shapes: list[Shape]) -> bytes:
 
 def _shape(model: mujoco.MjModel, geom: int) -> Shape:
     kind = int(model.geom_type[geom])
-    if kind not in _MESHES:
+    if kind != mujoco.mjtGeom.mjGEOM_HFIELD and kind not in _MESHES:
         raise SuiteError(
             f"geom {model.geom(geom).name or geom}: a browser is shown {', '.join(_NAMES)} only; "
             "put one of them in its place"
         )
-    mesh = _MESHES[kind](model.geom_size[geom])
+    mesh = _MESHES[kind](model.geom_size[geom]) if kind in _MESHES else _ground(model, int(model.geom_dataid[geom]))
     place = quaternion_matrix(model.geom_quat[geom])
     place[:3, 3] = model.geom_pos[geom]
     mesh.apply_transform(place)
@@ -112,6 +112,18 @@ def _box(size: np.ndarray) -> trimesh.Trimesh:
     mesh = box(extents=2.0 * size)
     mesh.unmerge_vertices()  # its edges are sharp
     return mesh
+
+
+def _ground(model: mujoco.MjModel, field: int) -> trimesh.Trimesh:
+    """The upper side of a height field, by the triangles that the engine collides with."""
+    rows, columns, first = (int(of[field]) for of in (model.hfield_nrow, model.hfield_ncol, model.hfield_adr))
+    half_x, half_y, top, _ = model.hfield_size[field]
+    z = top * model.hfield_data[first : first + rows * columns].reshape(rows, columns)
+    x, y = np.meshgrid(np.linspace(-half_x, half_x, columns), np.linspace(-half_y, half_y, rows))
+    corner = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)).ravel()
+    across = corner + columns + 1
+    faces = np.concatenate([np.stack([corner, corner + 1, across], -1), np.stack([corner, across, across - 1], -1)])
+    return trimesh.Trimesh(np.stack([x, y, z], -1).reshape(-1, 3), faces, process=False)
 
 
 _NAMES = ("sphere", "ellipsoid", "capsule", "cylinder", "box")

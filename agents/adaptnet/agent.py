@@ -6,18 +6,20 @@ import torch
 from gymnasium.vector import VectorEnv
 from torch import Tensor
 
-from murmillo.agents.adaptnet.base import Base
 from murmillo.agents.adaptnet.config import AdaptNetConfig
 from murmillo.agents.adaptnet.ensemble import Ensemble, hinge_loss, imitation_reward
 from murmillo.agents.adaptnet.merge import merge
 from murmillo.agents.adaptnet.model import make_model
 from murmillo.agents.adaptnet.spaces import Observed
-from murmillo.agents.common.adapter import INJECTION, AdaptedPolicy
+from murmillo.agents.common.adaptation import announce, penalties
+from murmillo.agents.common.adapter import AdaptedPolicy
+from murmillo.agents.common.base import Base
 from murmillo.agents.common.discriminator import Windows
 from murmillo.agents.common.errors import AgentError
 from murmillo.agents.common.exploration import ActionNoise
 from murmillo.agents.common.interface import Demonstrations, Obs, Step
 from murmillo.agents.common.masks import FeatureMasks
+from murmillo.agents.common.networks import Told
 from murmillo.agents.common.ppo import PPO, Minibatch
 from murmillo.agents.common.ranks import ALONE, Ranks
 from murmillo.agents.common.rollout import Rollout
@@ -176,25 +178,17 @@ class AdaptNet:
         drawn = self.demonstrations(self.config.discriminator.minibatch, self.generator)
         self.discriminator.observe(drawn["window"], drawn.get("mask"))
 
-    def _tell(self, batch: Minibatch) -> dict[str, Tensor]:
+    def _tell(self, batch: Minibatch) -> Told:
         """What policy and critics are told; of an adapted policy also its injection, which is penalised too."""
-        policy, told = self.model.policy, self.observed.beside(batch)
-        if isinstance(policy, AdaptedPolicy) and policy.adapters[0].spaces:
-            batch[INJECTION] = policy.injection(batch["state"], told)
-            return {**told, INJECTION: batch[INJECTION]}
-        return told
+        return announce(self.model.policy, batch, self.observed.beside(batch))
 
     def _regularise(self, batch: Minibatch, parameters: Tensor) -> dict[str, Tensor]:
         """The penalties of eq. 12, and the weight decay of FT + Reg."""
-        config, policy, penalties = self.config, self.model.policy, {}
-        if INJECTION in batch:
-            penalties["injection"] = config.injection_penalty * batch[INJECTION].norm(dim=-1).mean()
-        if isinstance(policy, AdaptedPolicy):
-            penalties["decay"] = config.weight_decay * policy.adapters[0].size()
-        elif self.base is not None and config.method == "finetune":
+        config, policy = self.config, self.model.policy
+        if self.base is not None and config.method == "finetune":
             squares = torch.stack([parameter.square().sum() for parameter in policy.parameters()])
-            penalties["decay"] = config.weight_decay * squares.sum()
-        return penalties
+            return {"decay": config.weight_decay * squares.sum()}
+        return penalties(policy, batch, config)
 
 
 def _another(theirs: str | None, ours: str | None) -> str:

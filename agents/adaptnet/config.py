@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass, field
 
 from murmillo.agents.adaptnet.ensemble import EnsembleConfig
-from murmillo.agents.common.adapter import AdapterConfig
+from murmillo.agents.common.adaptation import AdaptationConfig
 from murmillo.agents.common.errors import AgentError
 from murmillo.agents.common.numbers import check_at_least
 from murmillo.agents.common.ppo import PPOConfig
@@ -13,7 +13,7 @@ METHODS = ("adaptnet", "finetune", "progressive")
 
 
 @dataclass
-class AdaptNetConfig:
+class AdaptNetConfig(AdaptationConfig):
     """The released code's numbers; the paper's appendix, which lists them, is not at hand.
 
     gamma and lambda (0.95 both), the weights of the objectives (0.5 each) and the reward of a termination (-25) are the
@@ -23,12 +23,8 @@ class AdaptNetConfig:
         window: W, frames that the discriminators see.
         recurrent: units of the GRU that reads the last states, in the policy and in the critic.
         method: how a base policy is adapted: "adaptnet", or the paper's baselines "finetune" (FT; with `weight_decay`
-            FT + Reg) and "progressive" (PNet). Without a base the policy is trained from nothing ("Scratch").
-        adapter: what AdaptNet changes.
-        injection_penalty: beta of eq. 12, on the length of what is added to the latents. 0.01 does for all styles;
-            tasks that are no styles need none (section 10.2).
-        weight_decay: kappa of eq. 12, on the squared weights of the adaptors, or of all that "finetune" trains; the
-            paper does not say how much.
+            FT + Reg, on the squares of all that it trains) and "progressive" (PNet). Without a base the policy is
+            trained from nothing ("Scratch").
         popart: momentum of the returns' statistics.
         ppo: policy and critic; `std` is where the state-dependent one begins.
         discriminator: the ensemble.
@@ -37,9 +33,6 @@ class AdaptNetConfig:
     window: int = 5
     recurrent: int = 256
     method: str = "adaptnet"
-    adapter: AdapterConfig = field(default_factory=AdapterConfig)
-    injection_penalty: float = 0.01
-    weight_decay: float = 1e-4
     popart: float = 0.1
     ppo: PPOConfig = field(
         default_factory=lambda: PPOConfig(
@@ -60,9 +53,7 @@ class AdaptNetConfig:
     def __post_init__(self) -> None:
         if self.method not in METHODS:
             raise AgentError(f"agent.method={self.method} is not one of {', '.join(METHODS)}")
-        for name in ("injection_penalty", "weight_decay"):
-            if not getattr(self, name) >= 0:
-                raise AgentError(f"agent.{name}={getattr(self, name)}: a penalty is 0 or more")
+        super().__post_init__()
         check_at_least(1, self, "agent", "recurrent")
         if not 0 < self.popart <= 1:
             raise AgentError(f"agent.popart={self.popart}: needs a share above 0, at most 1")

@@ -6,9 +6,10 @@ from collections.abc import Iterator
 import torch
 from torch import Tensor, nn
 
-from murmillo.agents.adaptnet.networks import HeightMapEncoder, HistoryEncoder, RecurrentPolicy
+from murmillo.agents.adaptnet.networks import HistoryEncoder, RecurrentPolicy
 from murmillo.agents.common.adapter import AdaptedPolicy, Adapter, affine, linear_layers
 from murmillo.agents.common.errors import AgentError
+from murmillo.agents.common.heights import HeightMapEncoder
 
 
 @torch.no_grad()

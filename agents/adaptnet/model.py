@@ -1,30 +1,20 @@
 """Policy, critics and normalisers of each way to adapt, put together."""
 
-import copy
-
 import torch
 from torch import Tensor
 
-from murmillo.agents.adaptnet.base import Base
 from murmillo.agents.adaptnet.config import AdaptNetConfig
-from murmillo.agents.adaptnet.networks import (
-    HEIGHTS,
-    LENGTH,
-    HeightMapEncoder,
-    HistoryCritic,
-    HistoryEncoder,
-    ProgressivePolicy,
-    RecurrentPolicy,
-)
+from murmillo.agents.adaptnet.networks import LENGTH, HistoryCritic, HistoryEncoder, ProgressivePolicy, RecurrentPolicy
 from murmillo.agents.adaptnet.spaces import Observed
 from murmillo.agents.common.adapter import AdaptedPolicy, Adapter, Views
+from murmillo.agents.common.base import Base
 from murmillo.agents.common.errors import AgentError
+from murmillo.agents.common.heights import HEIGHTS, HeightMapEncoder
 from murmillo.agents.common.networks import Policy
 from murmillo.agents.common.normalizer import RunningNormalizer
 from murmillo.agents.common.popart import PopArt
 from murmillo.agents.common.ppo import ActorCritic
 from murmillo.agents.common.rollout import Rollout
-from murmillo.agents.common.training import load_module
 
 
 class HistoryActorCritic(ActorCritic):
@@ -83,25 +73,15 @@ def make_model(
         normalizer = RunningNormalizer((observed.state_dim,))
         return HistoryActorCritic(observed, policy, normalizer, objectives, config, generator)
 
-    if base.actions != observed.action_dim:
-        raise AgentError(
-            f"the base acts with {base.actions} numbers, the environment takes {observed.action_dim}; "
-            "prune the outputs of joints that are locked"
-        )
     seen_maps = any(name.startswith("encoder.controls") for name in base.policy)
     if seen_maps and not maps:
         raise AgentError(
             "the base acts by a map of heights, the environment shows none; give it uneven ground, or name another base"
         )
-    own = RecurrentPolicy(_encoder(observed, config, generator, seen_maps), base.actions, hidden, std, generator)
-    load_module(own, base.policy, "base policy")
-    frozen = RunningNormalizer((observed.state_dim,))
-    load_module(frozen, base.normalizer, "base's normaliser")
-    learning = _restarted(frozen)
-    frozen.freeze()
+    encoder = _encoder(observed, config, generator, seen_maps)
+    own, views = base.adopt(RecurrentPolicy(encoder, observed.action_dim, hidden, std, generator), observed.state_dim)
     if config.method == "finetune":
-        return HistoryActorCritic(observed, own, learning, objectives, config, generator)
-    views = Views(frozen, learning)
+        return HistoryActorCritic(observed, own, views.normalizers[1], objectives, config, generator)
     if config.method == "progressive":
         encoder = _encoder(observed, config, generator, maps)
         policy = ProgressivePolicy(own, encoder, hidden, std, generator)
@@ -115,11 +95,3 @@ def make_model(
 def _encoder(observed: Observed, config: AdaptNetConfig, generator: torch.Generator, maps: bool) -> HistoryEncoder:
     controls = [HeightMapEncoder(generator)] if maps else []
     return HistoryEncoder(observed.state_dim, observed.goal_dim, config.recurrent, generator, controls)
-
-
-def _restarted(normalizer: RunningNormalizer) -> RunningNormalizer:
-    """A copy that learns on as if it had seen one sample only (released code)."""
-    fresh = copy.deepcopy(normalizer)
-    fresh.frozen.fill_(False)
-    fresh.count.fill_(1.0)
-    return fresh

@@ -1,46 +1,17 @@
 """Policy and critic on the last states, a goal and, where there is one, a map of the ground (AdaptNet, Figure 3)."""
 
 import copy
-import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import torch
 from torch import Tensor, nn
 
-from murmillo.agents.common.errors import AgentError
-from murmillo.agents.common.networks import GaussianPolicy, Told, linear, mlp
+from murmillo.agents.common.heights import HeightMapEncoder
+from murmillo.agents.common.networks import GaussianPolicy, Told, by_name, linear, mlp
 from murmillo.agents.common.recurrent import LastOutput
 
-LENGTH, GOAL, HEIGHTS = "length", "goal", "heights"
-"""What policy and critic are told beside the states: valid frames `[...]`, goal `[..., G]`, map `[..., X, Y]`."""
-MAP_SIZE = 35
-"""Cells of the map in each direction that the convolutions are made for."""
-
-
-class HeightMapEncoder(nn.Module):
-    """G: 256 features of a map of the ground, 35 x 35 cells."""
-
-    size = 256
-
-    def __init__(self, generator: torch.Generator) -> None:
-        super().__init__()
-        convolutions = [
-            nn.Conv2d(1, 32, 5, stride=5),
-            nn.Conv2d(32, 64, 3),
-            nn.Conv2d(64, 128, 3),
-            nn.Conv2d(128, self.size, 3),
-        ]
-        for layer in convolutions:
-            bound = 1 / math.sqrt(layer.weight[0].numel())
-            nn.init.uniform_(layer.weight, -bound, bound, generator=generator)
-            nn.init.zeros_(layer.bias)  # type: ignore[arg-type]  # it has one
-        first, *others = convolutions
-        self.layers = nn.Sequential(first, *(part for layer in others for part in (nn.ReLU(), layer)), nn.Flatten())
-
-    def forward(self, told: Told) -> Tensor:
-        """`[..., 256]` of the map `[..., 35, 35]` [m], normalised by the environment."""
-        heights = _named(told)[HEIGHTS]
-        return self.layers(heights.flatten(0, -3)[:, None]).unflatten(0, heights.shape[:-2])
+LENGTH, GOAL = "length", "goal"
+"""What policy and critic are told beside the states: valid frames `[...]`, goal `[..., G]`; `HEIGHTS` is a third."""
 
 
 class HistoryEncoder(nn.Module):
@@ -71,7 +42,7 @@ class HistoryEncoder(nn.Module):
 
     def forward(self, state: Tensor, told: Told = None) -> Tensor:
         """`[..., Z]` of normalised states `[..., F, D]`, oldest first."""
-        named = _named(told)
+        named = by_name(told)
         parts = [self.history(state, named.get(LENGTH))]
         if self.goal_dim:
             parts.append(named[GOAL])
@@ -180,17 +151,3 @@ class HistoryCritic(nn.Module):
         """`[..., C]` of normalised states `[..., F, D]`; of several views of them it looks at the last."""
         own = state[..., -self.encoder.history.gru.input_size :]
         return self.head(self.trunk(self.encoder(own, told)))
-
-
-def check_map(shape: tuple[int, ...]) -> None:
-    """Refuse a map that the convolutions are not made for."""
-    if shape != (MAP_SIZE, MAP_SIZE):
-        raise AgentError(f"the environment's 'heights' are {list(shape)}; the policy reads [{MAP_SIZE}, {MAP_SIZE}]")
-
-
-def _named(told: Told) -> Mapping[str, Tensor]:
-    """What is told, by name."""
-    if told is None:
-        return {}
-    assert isinstance(told, Mapping)
-    return told

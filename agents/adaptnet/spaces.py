@@ -7,9 +7,10 @@ from gymnasium import spaces
 from gymnasium.vector import VectorEnv
 from torch import Tensor
 
-from murmillo.agents.adaptnet.networks import GOAL, HEIGHTS, LENGTH, check_map
+from murmillo.agents.adaptnet.networks import GOAL, LENGTH
 from murmillo.agents.common.dimensions import action_size
 from murmillo.agents.common.errors import AgentError
+from murmillo.agents.common.heights import HEIGHTS, check_map
 from murmillo.agents.common.interface import Demonstrations, Obs
 
 

@@ -8,24 +8,27 @@ from torch import Tensor
 
 from murmillo.agents.ase.config import ASEConfig
 from murmillo.agents.ase.encoder import Encoder
+from murmillo.agents.common.base import EYE, Base, take_over
 from murmillo.agents.common.dimensions import dimensions
 from murmillo.agents.common.discriminator import Discriminator, Windows, discriminator_loss
 from murmillo.agents.common.exploration import ActionNoise
 from murmillo.agents.common.interface import Demonstrations, Obs, Step
 from murmillo.agents.common.latents import LatentSequence, sample_sphere
 from murmillo.agents.common.masks import FeatureMasks
-from murmillo.agents.common.ppo import PPO, ActorCritic, Minibatch
+from murmillo.agents.common.ppo import PPO, Minibatch
 from murmillo.agents.common.ranks import ALONE, Ranks
 from murmillo.agents.common.replay import Replay
 from murmillo.agents.common.rollout import Rollout
 from murmillo.agents.common.skill_discovery import diversity_loss, encoder_loss, skill_reward
+from murmillo.agents.common.skill_model import SkillModel
 from murmillo.agents.common.training import Means, adam, load_parts, minimise, named, state_of
 
 
 class ASE:
-    """A policy pi(a | s, z) that behaves like the demonstrations, and differently for every latent z on the sphere."""
+    """A policy pi(a | s, z) that behaves like the demonstrations, and differently for every latent z on the sphere.
 
-    needs = frozenset({"state", "next_state", "next_window"})
+    With a base it adapts that: what each latent is for is still said by the base's encoder (`SkillModel`).
+    """
 
     def __init__(
         self,
@@ -33,6 +36,7 @@ class ASE:
         demonstrations: Demonstrations,
         config: ASEConfig,
         generator: torch.Generator,
+        base: Base | None = None,
         *,
         ranks: Ranks = ALONE,
     ) -> None:
@@ -42,19 +46,24 @@ class ASE:
             demonstrations: windows of the reference motions.
             config: hyperparameters.
             generator: draws weights, latents, noise and minibatches.
+            base: the policy to adapt, with what gives its latents their meaning; None to train one from nothing.
             ranks: who train it together, each with an `env` of as many worlds.
 
         Raises:
-            AgentError: environment or demonstrations give no windows of `config.window` frames.
+            AgentError: environment or demonstrations give no windows of `config.window` frames,
+                or the base is another agent's or of other sizes.
         """
         state_dim, action_dim = dimensions(env, demonstrations, config.window)
         self.config = config
+        self.base = base is not None
+        """Whether a base is adapted."""
         self.latent_dim = config.latent_dim
         self.demonstrations = demonstrations
         self.generator = generator
         self.ranks = ranks
         self.latents = LatentSequence(env.num_envs, config.latent_dim, generator, *config.latent_steps, ranks=ranks)
-        self.model = ActorCritic(state_dim, action_dim, config.latent_dim, config.ppo, generator)
+        self.model = SkillModel(env, state_dim, action_dim, config.latent_dim, config, generator, base)
+        self.needs = self.model.needs
         self.ppo = PPO(self.model, config.ppo)
         self.noise = ActionNoise(generator, config.ppo.noise_correlation, ranks)
         hidden = config.discriminator.hidden
@@ -63,6 +72,11 @@ class ASE:
         self._observe_demonstrations()
         self.masks = FeatureMasks(demonstrations)
         self.encoder = Encoder(config.window * state_dim, hidden, config.latent_dim, config.shared_trunk, generator)
+        self.eye = self.discriminator
+        if base is not None:  # the encoder is a head of the base's discriminator, or at least sees windows in its units
+            self.eye = Discriminator(config.window, state_dim, config.discriminator, generator)
+            take_over(self.eye, base, "discriminator")
+            take_over(self.encoder, base, "encoder")
         self.optimizer = adam(
             ([*self.discriminator.parameters(), *self.encoder.parameters()], config.discriminator.learning_rate)
         )
@@ -75,16 +89,18 @@ class ASE:
             "optimizer": self.optimizer,
             "replay": self.replay,
             "latents": self.latents,
+            **({EYE: self.eye} if self.base else {}),
         }
 
     def act(self, obs: Obs, *, deterministic: bool = False) -> Step:
         """Lines 9-11: one step under the sequence of latents; the mean action if deterministic."""
         latent = self.latents.step()
-        action, log_prob = self.model.act(obs["state"], latent, None if deterministic else self.noise)
+        told = self.model.told(latent, obs)
+        action, log_prob = self.model.act(obs["state"], told, None if deterministic else self.noise)
         return Step(action, log_prob, {"latent": latent})
 
     def value(self, obs: Obs, extras: dict[str, Tensor]) -> Tensor:
-        return self.model.value(obs["state"], extras["latent"])
+        return self.model.value(obs["state"], self.model.told(extras["latent"], obs))
 
     def reset(self, env_ids: Tensor) -> None:
         self.latents.reset(env_ids)
@@ -95,9 +111,13 @@ class ASE:
         config, worlds = self.config, rollout.ranks.worlds(rollout.num_envs)
         style, skill = [], []
         for window, latent in zip(rollout["next_window"], rollout["latent"], strict=True):
-            x = self.discriminator.prepare(window, self.masks.draw(len(window), self.generator, part=worlds))
+            mask = self.masks.draw(len(window), self.generator, part=worlds)
+            x = self.discriminator.prepare(window, mask)
             features = self.discriminator.features(x)
             style.append(self.discriminator.reward(self.discriminator.judge(features)))
+            if self.base:
+                x = self.eye.prepare(window, mask)
+                features = self.eye.features(x)
             skill.append(skill_reward(self.encoder(x, features), latent, config.kappa, config.skill_reward))
         terms = {"style": torch.stack(style)}
         return terms | {"skill": torch.stack(skill)} if config.skill_discovery else terms
@@ -122,7 +142,7 @@ class ASE:
                 generator=generator,
             )
             losses = dict(loss.parts)
-            if config.skill_discovery:
+            if config.skill_discovery and not self.base:
                 mu_q = self.encoder(loss.agent_inputs, loss.agent_features)
                 losses["encoder"] = part.weight * encoder_loss(mu_q, latents[rows], config.kappa)
             minimise(self.optimizer, losses, ranks=rollout.ranks)
@@ -132,9 +152,9 @@ class ASE:
         ppo = self.ppo.update(
             rollout,
             generator,
-            fields=("latent",),
-            condition=lambda batch: batch["latent"],
-            extra_loss=self._diversity,
+            fields=("latent", *self.model.seen),
+            condition=lambda batch: self.model.tell(batch["latent"], batch),
+            extra_loss=lambda batch, mean: self._diversity(batch, mean) | self.model.penalties(batch),
         )
         self.replay.add({"window": windows}, generator, rollout.part)
         self.discriminator.normalizer.update(rollout["next_state"], ranks=rollout.ranks)
@@ -162,8 +182,8 @@ class ASE:
         if config.diversity == "none":
             return {}
         z = batch.part.of(sample_sphere(batch.part.total, config.latent_dim, self.generator))
-        other_mean = self.model.policy(batch["state"], z)
-        std = self.model.policy.log_std.detach().exp()
+        other_mean = self.model.policy(batch["state"], self.model.told(z, batch))
+        std = self.model.policy.moments(mean)[1].detach().exp()
         loss = diversity_loss(mean, other_mean, batch["latent"], z, std, config.diversity)
         return {"diversity": config.diversity_weight * loss}
 

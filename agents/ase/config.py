@@ -5,13 +5,13 @@ from dataclasses import dataclass, field
 from murmillo.agents.common.discriminator import DiscriminatorConfig
 from murmillo.agents.common.errors import AgentError
 from murmillo.agents.common.numbers import check_above_zero, check_at_least
-from murmillo.agents.common.ppo import PPOConfig
+from murmillo.agents.common.skill_model import SkillConfig
 
 CHOICES = {"skill_reward": ("log_q", "clamped"), "diversity": ("action", "kl", "none")}
 
 
 @dataclass
-class ASEConfig:
+class ASEConfig(SkillConfig):
     """ASE's Table 2, and where it is silent the released code; gamma, lambda and beta are the runner's.
 
     On `diversity`: at std 0.05 the paper's KL divergence is 200 ||mu - mu'||^2, and eq. 15 wants it equal to D_z <= 1.
@@ -29,7 +29,6 @@ class ASEConfig:
         diversity: "action" (released code), "kl" (paper) or "none" (ablation).
         diversity_weight: w_div.
         shared_trunk: the encoder is a second head of the discriminator (paper), or has a trunk of its own.
-        ppo: policy and critic.
         discriminator: discriminator and encoder.
     """
 
@@ -42,10 +41,10 @@ class ASEConfig:
     diversity: str = "action"
     diversity_weight: float = 0.01
     shared_trunk: bool = True
-    ppo: PPOConfig = field(default_factory=PPOConfig)
     discriminator: DiscriminatorConfig = field(default_factory=DiscriminatorConfig)
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         for name, choices in CHOICES.items():
             if getattr(self, name) not in choices:
                 raise AgentError(f"agent.{name}={getattr(self, name)} is not one of {', '.join(choices)}")

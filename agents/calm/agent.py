@@ -11,22 +11,25 @@ from murmillo.agents.calm.config import CALMConfig
 from murmillo.agents.calm.encoder import MotionEncoder
 from murmillo.agents.calm.losses import alignment_loss, uniformity_loss
 from murmillo.agents.calm.motions import MotionSequence, cut, select
+from murmillo.agents.common.base import Base, take_over
 from murmillo.agents.common.dimensions import dimensions
 from murmillo.agents.common.discriminator import Discriminator, Windows, discriminator_loss
 from murmillo.agents.common.exploration import ActionNoise
 from murmillo.agents.common.interface import Demonstrations, Obs, Step
 from murmillo.agents.common.latents import sample_sphere
-from murmillo.agents.common.ppo import PPO, ActorCritic, Minibatch
+from murmillo.agents.common.ppo import PPO, Minibatch
 from murmillo.agents.common.ranks import ALONE, Part, Ranks
 from murmillo.agents.common.replay import Replay
 from murmillo.agents.common.rollout import Rollout
+from murmillo.agents.common.skill_model import SkillModel
 from murmillo.agents.common.training import Means, adam, load_parts, minimise, named, state_of
 
 
 class CALM:
-    """A policy pi(a | s, z) that follows the motion M whose encoding z = E(M) it is given."""
+    """A policy pi(a | s, z) that follows the motion M whose encoding z = E(M) it is given.
 
-    needs = frozenset({"state", "next_state", "next_window"})
+    With a base it adapts that, and goes on following what the base's encoder makes of motions (`SkillModel`).
+    """
 
     def __init__(
         self,
@@ -34,6 +37,7 @@ class CALM:
         demonstrations: Demonstrations,
         config: CALMConfig,
         generator: torch.Generator,
+        base: Base | None = None,
         *,
         ranks: Ranks = ALONE,
     ) -> None:
@@ -43,19 +47,26 @@ class CALM:
             demonstrations: windows of the reference motions, of as many frames as asked for.
             config: hyperparameters.
             generator: draws weights, motions, noise and minibatches.
+            base: the policy to adapt, with what gives its latents their meaning; None to train one from nothing.
             ranks: who train it together, each with an `env` of as many worlds.
 
         Raises:
-            AgentError: environment or demonstrations give no windows of `config.window` frames.
+            AgentError: environment or demonstrations give no windows of `config.window` frames,
+                or the base is another agent's or of other sizes.
         """
         state_dim, action_dim = dimensions(env, demonstrations, config.window)
         self.config = config
+        self.base = base is not None
+        """Whether a base is adapted."""
         self.latent_dim = config.latent_dim
         self.demonstrations = demonstrations
         self.generator = generator
         self.ranks = ranks
-        self.model = ActorCritic(state_dim, action_dim, config.latent_dim, config.ppo, generator)
+        self.model = SkillModel(env, state_dim, action_dim, config.latent_dim, config, generator, base)
+        self.needs = self.model.needs
         self.encoder = MotionEncoder(state_dim, config.latent_dim, config.encoder, generator)
+        if base is not None:
+            take_over(self.encoder, base, "encoder")
         self.ppo = PPO(self.model, config.ppo, self.encoder.parameters())
         self.noise = ActionNoise(generator, config.ppo.noise_correlation, ranks)
         condition = LatentCondition(config.latent_dim, config.discriminator_style_hidden, generator)
@@ -103,13 +114,14 @@ class CALM:
         if deterministic:
             self.motions.forget()  # nothing is learnt from a mean action: a player keeps no more than it follows
         latent, motion = self.motions.step()
-        action, log_prob = self.model.act(obs["state"], latent, None if deterministic else self.noise)
+        told = self.model.told(latent, obs)
+        action, log_prob = self.model.act(obs["state"], told, None if deterministic else self.noise)
         mask = self.motions.mask(motion)
         extras = {"latent": latent, "motion": motion}
         return Step(action, log_prob, extras if mask is None else extras | {"mask": mask})
 
     def value(self, obs: Obs, extras: dict[str, Tensor]) -> Tensor:
-        return self.model.value(obs["state"], extras["latent"])
+        return self.model.value(obs["state"], self.model.told(extras["latent"], obs))
 
     def reset(self, env_ids: Tensor) -> None:
         self.motions.reset(env_ids)
@@ -145,9 +157,10 @@ class CALM:
         ppo = self.ppo.update(
             rollout,
             generator,
-            fields=("motion",),
-            condition=self._encode_batch,
-            other_loss=lambda: self._structure(pool),
+            fields=("motion", "latent", *self.model.seen),
+            condition=lambda batch: self.model.tell(self._encode_batch(batch), batch),
+            extra_loss=lambda batch, mean: self.model.penalties(batch),
+            other_loss=lambda: {} if self.base else self._structure(pool),
         )
         remembered = {"window": windows, "condition": latents}
         self.replay.add(remembered if masks is None else remembered | {"mask": masks}, generator, rollout.part)
@@ -157,7 +170,12 @@ class CALM:
         return named("discriminator", means.result(rollout.ranks)) | named("ppo", ppo)
 
     def _encode_batch(self, batch: Minibatch) -> Tensor:
-        """z = E(M) `[B, Z]` of a minibatch's motions, with gradient; each motion is encoded once."""
+        """z = E(M) `[B, Z]` of a minibatch's motions, with gradient; each motion is encoded once.
+
+        A base's encoder does not change, and its latents are those that acted.
+        """
+        if self.base:
+            return batch["latent"]
         motions, row = batch["motion"].unique(return_inverse=True)
         return self.encoder(self.motions.of(motions))[row]
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from murmillo.agents.common.discriminator import DiscriminatorConfig
 from murmillo.agents.common.errors import AgentError
 from murmillo.agents.common.numbers import check_at_least
-from murmillo.agents.common.ppo import PPOConfig
+from murmillo.agents.common.skill_model import SkillConfig
 
 NEGATIVES = ("sphere", "shuffled", "none")
 
@@ -40,7 +40,7 @@ class EncoderConfig:
 
 
 @dataclass
-class CALMConfig:
+class CALMConfig(SkillConfig):
     """CALM's appendix, and where it is silent the released code; gamma and lambda are the runner's.
 
     Attributes:
@@ -51,7 +51,6 @@ class CALMConfig:
             "sphere" draws it uniformly (eq. 7), "shuffled" takes another motion's encoding, "none" leaves such windows
             out (the released code's default).
         discriminator_style_hidden: hidden sizes of the network that the latent passes before the discriminator.
-        ppo: policy and critic.
         discriminator: the conditional discriminator.
         encoder: the motion encoder.
     """
@@ -61,11 +60,11 @@ class CALMConfig:
     window: int = 10
     negatives: str = "sphere"
     discriminator_style_hidden: tuple[int, ...] = (512, 256)
-    ppo: PPOConfig = field(default_factory=PPOConfig)
     discriminator: DiscriminatorConfig = field(default_factory=DiscriminatorConfig)
     encoder: EncoderConfig = field(default_factory=EncoderConfig)
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if self.negatives not in NEGATIVES:
             raise AgentError(f"agent.negatives={self.negatives} is not one of {', '.join(NEGATIVES)}")
         encoder = self.encoder

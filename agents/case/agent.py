@@ -9,17 +9,19 @@ from torch import Tensor
 from murmillo.agents.case.config import CASEConfig
 from murmillo.agents.case.focal import FocalSampling
 from murmillo.agents.case.networks import Encoder, LabelEmbedding, SkillHeads
+from murmillo.agents.common.base import EYE, Base, take_over
 from murmillo.agents.common.dimensions import dimensions, skill_count
 from murmillo.agents.common.discriminator import Discriminator, Windows, discriminator_loss
 from murmillo.agents.common.exploration import ActionNoise
 from murmillo.agents.common.interface import Demonstrations, Obs, Step
 from murmillo.agents.common.latents import LatentSequence, sample_sphere
 from murmillo.agents.common.masks import FeatureMasks
-from murmillo.agents.common.ppo import PPO, ActorCritic, Minibatch
+from murmillo.agents.common.ppo import PPO, Minibatch
 from murmillo.agents.common.ranks import ALONE, Part, Ranks
 from murmillo.agents.common.replay import Replay
 from murmillo.agents.common.rollout import Rollout
 from murmillo.agents.common.skill_discovery import diversity_loss, encoder_loss, skill_reward
+from murmillo.agents.common.skill_model import SkillModel
 from murmillo.agents.common.training import Means, adam, load_module, load_parts, minimise, named, state_of
 
 
@@ -29,9 +31,9 @@ class CASE:
     The label c is the environment's observation "skill": who sets it commands the character, at any step. While
     training it is drawn at the beginning of an episode, independently of the state (condition randomisation, appendix
     A.4.2). Skeletal residual forces, where the environment has them, are a part of the action like any other.
-    """
 
-    needs = frozenset({"state", "next_state", "next_window"})
+    With a base it adapts that, and the labels go on meaning what they meant (`SkillModel`).
+    """
 
     def __init__(
         self,
@@ -39,6 +41,7 @@ class CASE:
         demonstrations: Demonstrations,
         config: CASEConfig,
         generator: torch.Generator,
+        base: Base | None = None,
         *,
         ranks: Ranks = ALONE,
     ) -> None:
@@ -48,21 +51,27 @@ class CASE:
             demonstrations: windows of the reference motions, by label.
             config: hyperparameters.
             generator: draws weights, latents, noise and minibatches.
+            base: the policy to adapt, with what gives its latents their meaning; None to train one from nothing.
             ranks: who train it together, each with an `env` of as many worlds.
 
         Raises:
-            AgentError: environment or demonstrations give no windows of `config.window` frames, or no labels.
+            AgentError: environment or demonstrations give no windows of `config.window` frames, or no labels,
+                or the base is another agent's or of other sizes.
         """
         state_dim, action_dim = dimensions(env, demonstrations, config.window)
         labels = skill_count(env)
         self.config = config
+        self.base = base is not None
+        """Whether a base is adapted."""
         self.latent_dim = config.latent_dim
         self.demonstrations = demonstrations
         self.generator = generator
         self.ranks = ranks
         self.latents = LatentSequence(env.num_envs, config.latent_dim, generator, *config.latent_steps, ranks=ranks)
         self.label = LabelEmbedding(labels, config.label_dim, generator)
-        self.model = ActorCritic(state_dim, action_dim, config.latent_dim + config.label_dim, config.ppo, generator)
+        told_dim = config.latent_dim + config.label_dim
+        self.model = SkillModel(env, state_dim, action_dim, told_dim, config, generator, base)
+        self.needs = self.model.needs
         self.ppo = PPO(self.model, config.ppo, self.label.parameters())
         self.noise = ActionNoise(generator, config.ppo.noise_correlation, ranks)
         heads = SkillHeads(labels)
@@ -72,6 +81,12 @@ class CASE:
         self.encoder = Encoder(
             config.window * state_dim, config.encoder_hidden, config.latent_dim, labels, config.label_dim, generator
         )
+        self.eye = self.discriminator
+        if base is not None:
+            self.eye = Discriminator(config.window, state_dim, config.discriminator, generator, heads)
+            take_over(self.eye, base, "discriminator")  # for the encoder, which sees windows in its units
+            take_over(self.encoder, base, "encoder")
+            take_over(self.label, base, "label")
         self.optimizer = adam(
             ([*self.discriminator.parameters(), *self.encoder.parameters()], config.discriminator.learning_rate)
         )
@@ -88,6 +103,7 @@ class CASE:
             "replay": self.replay,
             "latents": self.latents,
             "focal": self.focal,
+            **({EYE: self.eye} if self.base else {}),
         }
         # known before the first update, lest that judges windows in raw units and every later one in other units
         self._observe(self._draw_demonstrations())
@@ -95,7 +111,7 @@ class CASE:
     def act(self, obs: Obs, *, deterministic: bool = False) -> Step:
         """One step under the labels that are commanded now and the sequence of latents."""
         latent, label = self.latents.step(), obs["skill"]
-        told = self.condition(latent, label)
+        told = self.model.told(self.condition(latent, label), obs)
         action, log_prob = self.model.act(obs["state"], told, None if deterministic else self.noise)
         return Step(action, log_prob, {"latent": latent, "label": label})
 
@@ -104,7 +120,7 @@ class CASE:
         return torch.cat([latent, self.label(label)], -1)
 
     def value(self, obs: Obs, extras: dict[str, Tensor]) -> Tensor:
-        return self.model.value(obs["state"], self.condition(extras["latent"], extras["label"]))
+        return self.model.value(obs["state"], self.model.told(self.condition(extras["latent"], extras["label"]), obs))
 
     def reset(self, env_ids: Tensor) -> None:
         self.latents.reset(env_ids)
@@ -125,8 +141,11 @@ class CASE:
         worlds = rollout.ranks.worlds(rollout.num_envs)
         fields = ("next_window", "label", "latent")
         for window, label, latent in zip(*(rollout[name] for name in fields), strict=True):
-            x = self.discriminator.prepare(window, self._masks_for(label, worlds))
+            mask = self._masks_for(label, worlds)
+            x = self.discriminator.prepare(window, mask)
             style.append(self.discriminator.reward(self.discriminator.judge(self.discriminator.features(x), label)))
+            if self.base:
+                x = self.eye.prepare(window, mask)
             skill.append(skill_reward(self.encoder(x, label), latent, config.kappa, config.skill_reward))
         terms = {"style": torch.stack(style)}
         return terms | {"skill": torch.stack(skill)} if config.skill_discovery else terms
@@ -146,7 +165,7 @@ class CASE:
             demonstration = self._draw_demonstrations(part)
             loss = discriminator_loss(self.discriminator, agent, replay, demonstration, generator=generator)
             losses = dict(loss.parts)
-            if config.skill_discovery:
+            if config.skill_discovery and not self.base:
                 mu_q = self.encoder(loss.agent_inputs, labels[rows])
                 losses["encoder"] = part.weight * encoder_loss(mu_q, latents[rows], config.kappa)
             minimise(self.optimizer, losses, ranks=rollout.ranks)
@@ -155,9 +174,9 @@ class CASE:
         ppo = self.ppo.update(
             rollout,
             generator,
-            fields=("latent", "label"),
-            condition=lambda batch: self.condition(batch["latent"], batch["label"]),
-            extra_loss=self._diversity,
+            fields=("latent", "label", *self.model.seen),
+            condition=lambda batch: self.model.tell(self.condition(batch["latent"], batch["label"]), batch),
+            extra_loss=lambda batch, mean: self._diversity(batch, mean) | self.model.penalties(batch),
         )
         demonstrations = self._draw_demonstrations()
         heads = self._practise(rollout, demonstrations)
@@ -244,8 +263,9 @@ class CASE:
         if config.diversity == "none":
             return {}
         z = batch.part.of(sample_sphere(batch.part.total, config.latent_dim, self.generator))
-        other_mean = self.model.policy(batch["state"], self.condition(z, batch["label"]))
-        std = self.model.policy.log_std.detach().exp()
+        other = self.model.told(self.condition(z, batch["label"]), batch)
+        other_mean = self.model.policy(batch["state"], other)
+        std = self.model.policy.moments(mean)[1].detach().exp()
         loss = diversity_loss(mean, other_mean, batch["latent"], z, std, config.diversity)
         return {"diversity": config.diversity_weight * loss}
 

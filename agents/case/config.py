@@ -6,6 +6,7 @@ from murmillo.agents.common.discriminator import DiscriminatorConfig
 from murmillo.agents.common.errors import AgentError
 from murmillo.agents.common.numbers import check_above_zero, check_at_least
 from murmillo.agents.common.ppo import PPOConfig
+from murmillo.agents.common.skill_model import SkillConfig
 
 CHOICES = {
     "focal": ("paper", "normalised", "code", "none"),
@@ -15,7 +16,7 @@ CHOICES = {
 
 
 @dataclass
-class CASEConfig:
+class CASEConfig(SkillConfig):
     """The numbers of C·ASE's appendix A.5, and ASE's where it names none; discount, lambda and beta are the runner's.
 
     Discriminator and encoder see the whole state. Appendix A.4.1 leaves sword and shield out of theirs, while A.5 masks
@@ -37,7 +38,6 @@ class CASEConfig:
         focal_start: iterations before the sampling leaves the uniform.
         focal_floor: least probability of a skill, as a share of the uniform (released code).
         upright_iterations: first iterations in which only the feet may touch the ground; 0 for no such curriculum.
-        ppo: policy and critic.
         discriminator: its dropout is the element-wise feature masking.
     """
 
@@ -62,6 +62,7 @@ class CASEConfig:
     )
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         for name, choices in CHOICES.items():
             if getattr(self, name) not in choices:
                 raise AgentError(f"agent.{name}={getattr(self, name)} is not one of {', '.join(choices)}")

@@ -4,6 +4,7 @@ An adapter shifts the latents of the policy and adds to its hidden layers. Both 
 begins with exactly what the policy does.
 """
 
+import copy
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
@@ -211,6 +212,15 @@ class Views(nn.Module):
     def __init__(self, *normalizers: RunningNormalizer) -> None:
         super().__init__()
         self.normalizers = cast("list[RunningNormalizer]", nn.ModuleList(normalizers))
+
+    @classmethod
+    def of(cls, normalizer: RunningNormalizer) -> "Views":
+        """Of a trained policy's normaliser, which is frozen here for good, and of one adapter."""
+        learning = copy.deepcopy(normalizer)
+        learning.frozen.fill_(False)
+        learning.count.fill_(1.0)  # released code
+        normalizer.freeze()
+        return cls(normalizer, learning)
 
     def forward(self, state: Tensor) -> Tensor:
         """`[..., V D]` from raw states `[..., D]`."""

@@ -66,8 +66,18 @@ def style_mlp(latent_dim: int, hidden: Sequence[int], generator: torch.Generator
     return nn.Sequential(mlp(sizes, generator), linear(sizes[-1], latent_dim, generator, bound=1.0), nn.Tanh())
 
 
+CONDITION = "condition"
+"""The name of the condition where policy and critic are told several things."""
+
 Told = Tensor | Mapping[str, Tensor] | None
 """What policy and critic are told beside the state: a condition `[..., C]`, several things by name, or nothing."""
+
+
+def by_name(told: Told) -> Mapping[str, Tensor]:
+    """What is told, by name; a condition alone has the name `CONDITION`."""
+    if told is None:
+        return {}
+    return {CONDITION: told} if isinstance(told, Tensor) else told
 
 
 class Policy(nn.Module):
@@ -181,8 +191,9 @@ class GaussianPolicy(Policy):
         return StyledState(copy.deepcopy(self.style))
 
 
-def styled(state: Tensor, condition: Told, style: nn.Module) -> Tensor:
+def styled(state: Tensor, told: Told, style: nn.Module) -> Tensor:
     """States `[..., D]` and beside each its condition `[..., C]`, if any, as the style network shows it."""
+    condition = by_name(told).get(CONDITION)
     return state if condition is None else torch.cat([state, style(condition)], -1)
 
 

@@ -108,17 +108,7 @@ class ActorCritic(nn.Module):
     ) -> None:
         """`policy`, `critic` and normalisers take the place of those that the config describes."""
         super().__init__()
-        self.policy: Policy = policy or GaussianPolicy(
-            state_dim,
-            action_dim,
-            config.hidden,
-            config.std,
-            generator,
-            condition_dim=condition_dim,
-            style_hidden=config.style_hidden if condition_dim else (),
-            mean_init_scale=config.mean_init_scale,
-            learn_std=config.std_learning_rate > 0,
-        )
+        self.policy: Policy = policy or gaussian_policy(state_dim, action_dim, condition_dim, config, generator)
         self.critic = critic or Critic(state_dim, condition_dim, config.hidden, generator)
         self.state_normalizer: Any = state_normalizer or RunningNormalizer((state_dim,))
         self.return_normalizer: Any = return_normalizer or RunningNormalizer()
@@ -143,6 +133,23 @@ class ActorCritic(nn.Module):
         """Let the normalisers learn from a rollout, once the update that used them is over."""
         self.state_normalizer.update(rollout["state"], ranks=rollout.ranks)
         self.return_normalizer.update(rollout["return"], ranks=rollout.ranks)
+
+
+def gaussian_policy(
+    state_dim: int, action_dim: int, condition_dim: int, config: PPOConfig, generator: torch.Generator
+) -> GaussianPolicy:
+    """The policy that the config describes, with the condition behind a style network."""
+    return GaussianPolicy(
+        state_dim,
+        action_dim,
+        config.hidden,
+        config.std,
+        generator,
+        condition_dim=condition_dim,
+        style_hidden=config.style_hidden if condition_dim else (),
+        mean_init_scale=config.mean_init_scale,
+        learn_std=config.std_learning_rate > 0,
+    )
 
 
 class PPO:

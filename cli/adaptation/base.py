@@ -2,18 +2,15 @@
 
 from dataclasses import dataclass
 from operator import attrgetter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from murmillo.agents.adaptnet.base import Base
 from murmillo.agents.adaptnet.config import AdaptNetConfig
-from murmillo.agents.common.errors import AgentError
 from murmillo.cli import foundations, runs
 from murmillo.cli.adaptation.words import AGENT, is_adaptnet_run
 from murmillo.cli.errors import CommandError
-from murmillo.cli.foundations import Foundation
+from murmillo.cli.foundations import Foundation, written
 from murmillo.cli.tasks.words import choices_of
 from murmillo.envs import EnvConfig
-from murmillo.envs.character import Character
 
 if TYPE_CHECKING:
     from murmillo.cli.adaptation.config import AdaptNetTrainConfig
@@ -39,15 +36,11 @@ class BaseRun(Foundation):
         Raises:
             CommandError: naming the setting.
         """
-        if env.character != (own := self.config.env.character):
-            raise CommandError(
-                f"env.character={env.character}: the policy of base={self.word} was trained with {own}; "
-                "drop env.character, or name another run"
-            )
+        self.check_same(SETTING, "env", env, self.config.env, ("character",))
 
     def sizes(self) -> list[str]:
         """Its policy's sizes as words `name=value`, since an adaptation has the same."""
-        return [f"agent.{name}={_listed(attrgetter(name)(self.config.agent))}" for name in _SIZES]
+        return [f"agent.{name}={written(attrgetter(name)(self.config.agent))}" for name in _SIZES]
 
     def check_sizes(self, agent: AdaptNetConfig) -> None:
         """Refuse a policy of another size.
@@ -55,25 +48,7 @@ class BaseRun(Foundation):
         Raises:
             CommandError: naming the setting.
         """
-        for name in _SIZES:
-            if (value := attrgetter(name)(agent)) != (own := attrgetter(name)(self.config.agent)):
-                raise CommandError(
-                    f"agent.{name}={_listed(value)}: the policy of base={self.word} has {_listed(own)}; "
-                    f"drop agent.{name}, or name another run"
-                )
-
-    def weights(self, character: Character) -> Base:
-        """Its policy, without the outputs for joints that the character has not.
-
-        Raises:
-            CommandError: its checkpoint is damaged.
-        """
-        try:
-            base = Base.load(self.folder / runs.LAST)
-        except AgentError as error:
-            raise CommandError(f"base={self.word}: {error}") from None
-        kept = [output for output in range(character.base.action_dim) if output not in character.pruned]
-        return base.pruned(kept) if character.pruned else base
+        self.check_same(SETTING, "agent", agent, self.config.agent, _SIZES)
 
 
 def find(word: str) -> BaseRun:
@@ -90,8 +65,3 @@ def find(word: str) -> BaseRun:
     if choices_of(word).get("stage") != "base":
         raise CommandError(f"base={word}: this run adapts a policy itself; name the run of stage=base that it adapts")
     return BaseRun(word, foundations.trained_run(word, SETTING), load(folder))
-
-
-def _listed(value: Any) -> str:
-    """As on the command line."""
-    return f"[{','.join(map(str, value))}]" if isinstance(value, tuple) else str(value)

@@ -8,10 +8,17 @@ AGENT = "adaptnet"
 
 
 def are_about_adaptnet(words: Sequence[str]) -> bool:
-    """Whether `murmillo train` is to train AdaptNet: by `agent=`, by `stage=`, or as the run that it takes up again."""
+    """Whether `murmillo train` is to train AdaptNet: by `agent=`, by `stage=`, or as a run that it is told of."""
     if (agent := value_of(words, "agent")) is not None:
         return agent == AGENT
-    return value_of(words, "stage") is not None or is_adaptnet_run(value_of(words, "run.resume"))
+    named = (value_of(words, name) for name in ("run.resume", "base"))
+    return value_of(words, "stage") is not None or any(map(is_adaptnet_run, named))
+
+
+def adapt_skills(words: Sequence[str]) -> bool:
+    """Whether `murmillo train` is to adapt a policy of ASE, CALM or C·ASE; AdaptNet's own words are asked first."""
+    new = value_of(words, "run.resume") in (None, "null", "")
+    return new and any(value_of(words, name) is not None for name in ("base", "to"))
 
 
 def is_adaptnet_run(folder: str | None) -> bool:

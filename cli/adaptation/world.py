@@ -42,7 +42,7 @@ def make_agent(
         AgentError, CommandError: environment, settings and base do not fit together.
     """
     generator = torch.Generator(env.device).manual_seed(config.seed)
-    weights = None if base is None or config.choices["method"] == SCRATCH else base.weights(env.character)
+    weights = None if base is None or config.choices["method"] == SCRATCH else base.policy(SETTING, env.character)
     return AdaptNet(env, env.demonstrations, config.agent, generator, weights, ranks=ranks), generator
 
 

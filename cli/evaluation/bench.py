@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 from murmillo.agents.common import checkpoint
 from murmillo.agents.common.interface import Steerable
-from murmillo.cli.agents import AGENTS, load_player, make_agent
+from murmillo.cli.agents import AGENTS, load_player, load_untrained, make_agent
 from murmillo.cli.config import TrainConfig
 from murmillo.cli.devices import for_playing
 from murmillo.cli.errors import CommandError
@@ -128,7 +128,7 @@ class Bench:
         """
         identity, request = self.identity(path), self.request
         made_of = (self.config.choices["agent"], self.config.agent, self.env, self.config.seed)
-        make = {TRAINED: lambda: load_player(*made_of, path), UNTRAINED: lambda: make_agent(*made_of)[0]}
+        make = {TRAINED: lambda: load_player(*made_of, path), UNTRAINED: lambda: load_untrained(*made_of, path)}
         agents = {source: make[source]() for source in sources if source in make}
         key = {name: identity[name] for name in ("checkpoint", "seed", "start")}
         store = ChunkStore(chunks, self.env.num_envs, {"format": _FORMAT, "clips": self.clips, **key})

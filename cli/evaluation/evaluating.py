@@ -51,6 +51,7 @@ def evaluate(config: TrainConfig, folder: Path, request: Request) -> dict[str, A
             "clips": _clips(bench),
             "hidden": list(config.agent.ppo.hidden),
             "left_out": bench.left_out,
+            **({} if config.base is None else {"base": config.base}),
             "seconds": round(time.monotonic() - begun, 1),
             "metrics": measured.metrics,
         }

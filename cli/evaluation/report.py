@@ -90,6 +90,10 @@ def _what(results: dict[str, Any]) -> str:
         f"{results['seed']}. The clips `{clips['motions']}` are {clips['count']}, {clips['distinct']} of them distinct"
         f"{f' ({same}: bit for bit the same, they count once)' if same else ''}, {clips['seconds']:.0f} s together.",
     ]
+    if "base" in results:
+        lines.append(
+            f"It adapts `{results['base']}`: the *{SOURCES[UNTRAINED]}* policy is that one, put into this world."
+        )
     if results["not_comparable"]:
         lines.append(f"**Not comparable**: {results['not_comparable']}.")
     return "\n\n".join(lines)

@@ -15,6 +15,7 @@ from murmillo.cli.evaluation.identity import checkpoint_digest
 from murmillo.cli.foundations import Foundation
 from murmillo.cli.tasks.words import is_task_run
 from murmillo.envs import EnvConfig, HumanoidVectorEnv
+from murmillo.envs.terrain import is_uneven
 
 NONE = "none"
 """`low=none`: the policy acts itself, on the character's own action."""
@@ -24,6 +25,7 @@ SCRATCH = "scratch"
 _SETTING = "low"
 _ITS_OWN = ("character", "window", "residual_force", "residual_reward")
 """Settings of the environment that its policy and its discriminator were made for."""
+_SEES = {True: "was adapted to uneven ground, which it sees", False: "was adapted without seeing the ground"}
 
 
 @dataclass(frozen=True)
@@ -51,12 +53,13 @@ class LowRun(Foundation):
         Raises:
             CommandError: naming the setting.
         """
-        for name in _ITS_OWN:
-            if (value := getattr(env, name)) != (own := getattr(self.config.env, name)):
-                raise CommandError(
-                    f"env.{name}={value}: the policy of low={self.word} was trained with {own}; "
-                    f"drop env.{name}, or name another run"
-                )
+        self.check_same(_SETTING, "env", env, self.config.env, _ITS_OWN)
+        sees = is_uneven(self.config.env.terrain)
+        if self.config.base is not None and is_uneven(env.terrain) != sees:
+            raise CommandError(
+                f"env.terrain.kind={env.terrain.kind}: the policy of low={self.word} {_SEES[sees]}; "
+                "drop env.terrain.*, or name another run"
+            )
 
     def load(self, env: HumanoidVectorEnv) -> Any:
         """Its agent, to be followed in `env`.

@@ -4,11 +4,11 @@ from pathlib import Path
 import pytest
 import torch
 
-from murmillo.agents.adaptnet.base import Base
 from murmillo.agents.adaptnet.networks import ProgressivePolicy
 from murmillo.agents.common import checkpoint
 from murmillo.agents.common.adapter import AdaptedPolicy, AdapterConfig
 from murmillo.agents.common.advantages import gae, normalise_advantage, weigh_advantages
+from murmillo.agents.common.base import Base
 from murmillo.agents.common.errors import AgentError
 from murmillo.agents.common.ppo import Minibatch
 from murmillo.agents.common.ranks import ALONE, Part
@@ -198,7 +198,7 @@ def test_what_is_blended_of_two_or_merged_learns_no_more(tmp_path: Path) -> None
 
 def test_an_adapted_run_is_no_base(tmp_path: Path) -> None:
     toy_runner(tmp_path, Wanderer(32), 0, make_base()).save()
-    with pytest.raises(AgentError, match="no policy of AdaptNet that was trained from nothing"):
+    with pytest.raises(AgentError, match="no policy that was trained from nothing"):
         Base.load(tmp_path)
 
 

@@ -7,8 +7,8 @@ import torch
 from torch import Tensor, nn
 
 from murmillo.agents.adaptnet.agent import AdaptNet
-from murmillo.agents.adaptnet.base import Base
 from murmillo.agents.common.adapter import INJECTION, AdaptedPolicy, Adapter, AdapterConfig, affine
+from murmillo.agents.common.base import Base
 from murmillo.agents.common.errors import AgentError
 from murmillo.agents.common.exploration import ActionNoise
 from murmillo.agents.common.interface import Obs

@@ -5,10 +5,11 @@ import torch
 from torch import Tensor, nn
 
 from murmillo.agents.adaptnet.ensemble import Ensemble, EnsembleConfig, hinge_loss, imitation_reward
-from murmillo.agents.adaptnet.networks import HeightMapEncoder, HistoryCritic, HistoryEncoder, RecurrentPolicy
+from murmillo.agents.adaptnet.networks import HistoryCritic, HistoryEncoder, RecurrentPolicy
 from murmillo.agents.common.discriminator import Windows
 from murmillo.agents.common.errors import AgentError
 from murmillo.agents.common.exploration import ActionNoise
+from murmillo.agents.common.heights import HeightMapEncoder
 from murmillo.agents.common.popart import PopArt
 from murmillo.agents.common.recurrent import LastOutput
 

@@ -19,17 +19,15 @@ from murmillo.agents.common.interface import Agent, MultiObjective, Steerable
 from murmillo.agents.common.rollout import Rollout, tensors, true_next_obs
 from murmillo.agents.common.runner import Runner
 from tests.agents.toy import PointMass, equal, make_ase, make_calm, make_case, make_runner, small_ase
+from tests.agents.toy_adapted import adapted
 from tests.agents.toy_adaptnet import make_adaptnet
 from tests.agents.toy_tasks import make_commanded, make_task
 
 Maker = Callable[..., Agent]
 HINGE = {"discriminator": replace(small_ase().discriminator, loss="hinge")}
-LOW_LEVEL: dict[str, Maker] = {
-    "ase": make_ase,
-    "calm": make_calm,
-    "case": make_case,
-    "case_hinge": lambda env, generator, **changes: make_case(env, generator, **{**HINGE, **changes}),
-}
+LOW_LEVEL: dict[str, Maker] = {"ase": make_ase, "calm": make_calm, "case": make_case}
+LOW_LEVEL |= {f"{name}_adapted": adapted(name) for name in list(LOW_LEVEL)}
+LOW_LEVEL["case_hinge"] = lambda env, generator, **changes: make_case(env, generator, **{**HINGE, **changes})
 AGENTS: dict[str, Maker] = {**LOW_LEVEL, "adaptnet": make_adaptnet, "task": make_task, "commanded": make_commanded}
 REWARDS = {
     "ase": {"style": 1.0, "skill": 0.5},
@@ -40,6 +38,7 @@ REWARDS = {
     "task": {"task": 1.0},
     "commanded": {"task": 1.0},
 }
+REWARDS |= {f"{name}_adapted": REWARDS[name] for name in ("ase", "calm", "case")}
 """What each counts on."""
 HORIZON = 9
 

@@ -21,6 +21,8 @@ RUNS: dict[str, tuple[str, dict[str, Any]]] = {
     "calm": ("calm", {}),
     "ase_hinge": ("ase", {"discriminator": HINGE}),
     "calm_shuffled": ("calm", {"negatives": "shuffled"}),
+    "case_adapted": ("case", {"discriminator": small_ase().discriminator, "adapted": True}),
+    "calm_adapted": ("calm", {"adapted": True}),
     "case_dropout": ("case", {}),
 }
 

@@ -35,11 +35,19 @@ class PointMass(VectorEnv):
     after `episode_steps`. `infos["final_obs"]` holds the true successors of all worlds, as arrays.
 
     The demonstrations of skill c of K move into the c-th of K equal sectors; those of the one skill move anywhere.
+    With `heights` there is a map to be seen, with numbers that mean nothing.
     """
 
     def __init__(
-        self, num_envs: int, window: int = 3, episode_steps: int = 16, bound: float = 1.2, skills: int = 1
+        self,
+        num_envs: int,
+        window: int = 3,
+        episode_steps: int = 16,
+        bound: float = 1.2,
+        skills: int = 1,
+        heights: bool = False,
     ) -> None:
+        self.heights = heights
         self.num_envs = num_envs
         self.skills = skills
         self.skill = np.zeros(num_envs, np.int64)
@@ -54,6 +62,7 @@ class PointMass(VectorEnv):
                 "state": spaces.Box(-np.inf, np.inf, (4,), np.float32),
                 "skill": spaces.Discrete(skills),
                 "window": spaces.Box(-np.inf, np.inf, (window, 4), np.float32),
+                **({"heights": spaces.Box(-np.inf, np.inf, (35, 35), np.float32)} if heights else {}),
             }
         )
         self.single_action_space = spaces.Box(-1, 1, (2,), np.float32)
@@ -99,7 +108,11 @@ class PointMass(VectorEnv):
 
     def _obs(self) -> dict[str, np.ndarray]:
         window = self.history.copy()
-        return {"state": window[:, -1], "skill": self.skill.copy(), "window": window}
+        seen = {"state": window[:, -1], "skill": self.skill.copy(), "window": window}
+        if self.heights:
+            cells = np.arange(35 * 35, dtype=np.float32)
+            seen["heights"] = np.sin(cells * (1 + window[:, -1, :1])).reshape(-1, 35, 35)
+        return seen
 
     def demonstrations(
         self,

@@ -12,9 +12,9 @@ from gymnasium.vector.utils import batch_space
 from torch import Tensor
 
 from murmillo.agents.adaptnet.agent import AdaptNet
-from murmillo.agents.adaptnet.base import Base
 from murmillo.agents.adaptnet.config import AdaptNetConfig
 from murmillo.agents.adaptnet.ensemble import EnsembleConfig
+from murmillo.agents.common.base import Base
 from murmillo.agents.common.runner import Runner, RunnerConfig
 from tests.agents.toy_tasks import Heading
 

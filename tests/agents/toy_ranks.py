@@ -15,6 +15,7 @@ from murmillo.agents.case.agent import CASE
 from murmillo.agents.common.ranks import ALONE, Ranks, joined
 from murmillo.agents.common.runner import Runner, RunnerConfig
 from tests.agents.toy import PointMass, small_ase, small_calm, small_case
+from tests.agents.toy_adapted import base_of, make_parent
 
 WORLDS, HORIZON = 12, 8
 
@@ -47,8 +48,8 @@ class Numbered(PointMass):
         self.episode = state["episode"].numpy().copy()
 
 
-def make_run(folder: Path, ranks: Ranks, method: str, iterations: int, **changes: Any) -> Runner:
-    """A run of `WORLDS` worlds in all."""
+def make_run(folder: Path, ranks: Ranks, method: str, iterations: int, adapted: bool = False, **changes: Any) -> Runner:
+    """A run of `WORLDS` worlds in all; `adapted` begins with a base."""
     generator = torch.Generator().manual_seed(3)
     share = WORLDS // ranks.size
     env = Numbered(share, first=share * ranks.rank, skills=3 if method == "case" else 1, episode_steps=6)
@@ -57,7 +58,8 @@ def make_run(folder: Path, ranks: Ranks, method: str, iterations: int, **changes
     settings.ppo.minibatch = 40  # 96 samples: 40, 40 and 16
     settings.discriminator.replay_size = 150  # it is full in the second iteration
     settings.discriminator.replay_keep = 0.3
-    agent = kind(env, env.demonstrations, settings, generator, ranks=ranks)  # type: ignore[arg-type]
+    base = base_of(make_parent(method, env.skills, **changes)) if adapted else None
+    agent = kind(env, env.demonstrations, settings, generator, base, ranks=ranks)  # type: ignore[arg-type]
     limits = RunnerConfig(samples=iterations * WORLDS * HORIZON, horizon=HORIZON, gamma=0.9, lam=0.9)
     if method == "calm":
         limits.reward_weights = {"style": 1.0}

@@ -5,10 +5,12 @@ import json
 import mujoco
 import numpy as np
 import pytest
+import torch
 
 from murmillo.envs import SuiteError
 from murmillo.envs.character import load_character
 from murmillo.envs.scene import Scene, add_box
+from murmillo.envs.terrain import Terrain, TerrainConfig
 
 pytest.importorskip("trimesh", reason="the extra play is not installed")
 
@@ -49,6 +51,17 @@ def test_meshes_have_the_sizes_of_their_geoms_and_look_outward(model: mujoco.MjM
         np.testing.assert_allclose(np.abs(points).max(0), expected, rtol=0.01)
         normals = in_geom_frame(model, shape.geom, shape.mesh.vertex_normals + model.geom_pos[shape.geom])
         assert ((points * normals).sum(-1) > 0.0).all(), shape.geom
+
+
+def test_uneven_ground_is_where_the_engine_has_it() -> None:
+    terrain = Terrain(TerrainConfig(kind="mixed", tiles=1))
+    (ground,) = [shape for shape in shapes_of(load_character("humanoid", terrain.edit).model) if shape.body == 0]
+    corners = torch.from_numpy(np.array(ground.mesh.vertices))
+    np.testing.assert_allclose(ground.mesh.vertices[:, 2], terrain.height(corners), atol=1e-6)
+    middles = torch.from_numpy(np.array(ground.mesh.triangles_center))
+    np.testing.assert_allclose(ground.mesh.triangles_center[:, 2], terrain.height(middles), atol=1e-6)
+    assert np.ptp(ground.mesh.vertices[:, 2]) > 0.1
+    assert (ground.mesh.face_normals[:, 2] > 0.0).all()
 
 
 def test_a_body_is_one_file_with_the_materials_of_its_geoms(model: mujoco.MjModel) -> None:

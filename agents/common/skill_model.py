@@ -1,0 +1,140 @@
+"""Policy and critic of the methods whose policies are told latents or labels; with a base, an adaptation of it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import torch
+from gymnasium import spaces
+from gymnasium.vector import VectorEnv
+from torch import Tensor, nn
+
+from murmillo.agents.common.adaptation import AdaptationConfig, announce, penalties
+from murmillo.agents.common.adapter import AdaptedPolicy, Adapter
+from murmillo.agents.common.base import Base
+from murmillo.agents.common.heights import HEIGHTS, HeightMapEncoder, check_map
+from murmillo.agents.common.networks import CONDITION, Critic, Told, by_name
+from murmillo.agents.common.ppo import ActorCritic, Minibatch, PPOConfig, gaussian_policy
+
+
+@dataclass
+class SkillConfig(AdaptationConfig):
+    """What the configurations of ASE, CALM and C·ASE begin with.
+
+    Attributes:
+        ppo: policy and critic.
+    """
+
+    ppo: PPOConfig = field(default_factory=PPOConfig)
+
+
+class SkillModel(ActorCritic):
+    """Policy and critic under a latent, a label or both.
+
+    With a base the policy is the base's, frozen, with an adapter that learns, and the critic is new: the skill
+    interface stays as it is. Where the environment shows its ground, adapter and critic see that too.
+
+    Attributes:
+        seen: observations that both are told beside the condition.
+    """
+
+    seen: tuple[str, ...] = ()
+
+    def __init__(
+        self,
+        env: VectorEnv,
+        state_dim: int,
+        action_dim: int,
+        condition_dim: int,
+        config: SkillConfig,
+        generator: torch.Generator,
+        base: Base | None = None,
+    ) -> None:
+        """
+        Args:
+            env: read for whether it shows a map of heights.
+            state_dim: D.
+            action_dim: A.
+            condition_dim: C, size of latent and label together.
+            config: sizes of the networks, and how a base is adapted.
+            generator: draws the initial weights.
+            base: the policy to adapt; None to make one from nothing.
+
+        Raises:
+            AgentError: the base does not fit the environment or the config.
+        """
+        if base is None:
+            super().__init__(state_dim, action_dim, condition_dim, config.ppo, generator)
+        else:
+            own, views = base.adopt(
+                gaussian_policy(state_dim, action_dim, condition_dim, config.ppo, generator), state_dim
+            )
+            maps = _shows_heights(env)
+            control, other = (HeightMapEncoder(generator) if maps else None for _ in range(2))
+            adapter = Adapter(own, config.adapter, generator, control, HeightMapEncoder.size if control else 0)
+            critic = SightedCritic(state_dim, condition_dim, config.ppo.hidden, generator, other)
+            policy = AdaptedPolicy(own, adapter)
+            super().__init__(
+                state_dim,
+                action_dim,
+                condition_dim,
+                config.ppo,
+                generator,
+                policy,
+                critic=critic,
+                state_normalizer=views,
+            )
+            self.seen = (HEIGHTS,) if maps else ()
+        self._config = config
+
+    @property
+    def needs(self) -> frozenset[str]:
+        """What its agent reads again after collection."""
+        return frozenset(
+            {"next_window", *(prefix + name for name in ("state", *self.seen) for prefix in ("", "next_"))}
+        )
+
+    def told(self, condition: Tensor, obs: Mapping[str, Tensor]) -> Told:
+        """What policy and critic are told: conditions `[..., C]`, and what they see of these observations."""
+        return {CONDITION: condition, **{name: obs[name] for name in self.seen}} if self.seen else condition
+
+    def tell(self, condition: Tensor, batch: Minibatch) -> Told:
+        """The same of a minibatch, which keeps what `penalties` asks for."""
+        return announce(self.policy, batch, self.told(condition, batch))
+
+    def penalties(self, batch: Minibatch) -> dict[str, Tensor]:
+        """What it costs to depart from the base, by name; nothing without one."""
+        return penalties(self.policy, batch, self._config)
+
+
+class SightedCritic(nn.Module):
+    """A critic that sees the newest of several `Views`, and the map of heights where there is one."""
+
+    def __init__(
+        self,
+        state_dim: int,
+        condition_dim: int,
+        hidden: Sequence[int],
+        generator: torch.Generator,
+        control: HeightMapEncoder | None,
+    ) -> None:
+        super().__init__()
+        self.state_dim = state_dim
+        self.control = control
+        width = condition_dim + (0 if control is None else control.size)
+        self.critic = Critic(state_dim, width, hidden, generator)
+
+    def forward(self, state: Tensor, told: Told) -> Tensor:
+        """`[...]` from normalised states `[..., V D]` and what is told."""
+        condition = by_name(told)[CONDITION]
+        if self.control is not None:
+            condition = torch.cat([condition, self.control(told)], -1)
+        return self.critic(state[..., -self.state_dim :], condition)
+
+
+def _shows_heights(env: VectorEnv) -> bool:
+    """Whether the environment shows a map of heights; an AgentError where that is of another size than is read."""
+    space = env.single_observation_space
+    if not isinstance(space, spaces.Dict) or HEIGHTS not in space.spaces:
+        return False
+    check_map(tuple(space[HEIGHTS].shape or ()))
+    return True
