@@ -58,6 +58,8 @@ class PPOConfig:
             acted [nat]; None goes on.
         lead_kl: lead the policy's learning rate from `policy_learning_rate` to where the mean KL of an iteration is
             about this [nat]; None keeps it.
+        kl_halving: iterations after which both KLs are half of what is asked for here, then a third and so on; 0 keeps
+            them. Large steps find balance, small ones keep it.
     """
 
     hidden: tuple[int, ...] = (1024, 1024, 512)
@@ -76,11 +78,12 @@ class PPOConfig:
     max_grad_norm: float | None = None
     target_kl: float | None = None
     lead_kl: float | None = None
+    kl_halving: int = 0
 
     def __post_init__(self) -> None:
         check_at_least(1, self, "agent.ppo", "epochs", "minibatch")
         check_at_least(0, self, "agent.ppo", "policy_learning_rate", "value_learning_rate", "std_learning_rate")
-        check_at_least(0, self, "agent.ppo", "mean_init_scale", "bound_weight", "value_weight")
+        check_at_least(0, self, "agent.ppo", "mean_init_scale", "bound_weight", "value_weight", "kl_halving")
         check_above_zero(self, "agent.ppo", "std", "clip", "max_grad_norm", "target_kl", "lead_kl")
         if not 0 <= self.noise_correlation < 1:
             raise AgentError(f"agent.ppo.noise_correlation={self.noise_correlation}: needs at least 0 and less than 1")
@@ -180,6 +183,7 @@ class PPO:
         )
         self._pace = 1.0
         """Of the policy: its learning rate as a multiple of the config's."""
+        self._iterations = 0
 
     def update(
         self,
@@ -221,17 +225,21 @@ class PPO:
         data["target"] = self.model.targets(rollout)
 
         means = Means()
+        calm = 1 + self._iterations / config.kl_halving if config.kl_halving else 1.0
         passes = [rollout.minibatches(config.minibatch, generator) for _ in range(config.epochs)]
         for rows, part in chain.from_iterable(passes):
             batch = Minibatch({name: value[rows] for name, value in data.items()}, part)
             losses, scores = self._losses(batch, condition(batch), extra_loss, other_loss)
             means.add({**losses, **scores})
-            if config.target_kl is not None and rollout.ranks.mean(scores["kl"]) > config.target_kl:
+            if config.target_kl is not None and rollout.ranks.mean(scores["kl"]) > config.target_kl / calm:
                 break
             minimise(self.optimizer, losses, config.max_grad_norm, ranks=rollout.ranks)
         self.model.observe(rollout)
+        self._iterations += 1
         stats = means.result(rollout.ranks)
-        return stats if config.lead_kl is None else stats | {"policy_rate": self._lead(stats["kl"] / config.lead_kl)}
+        if config.lead_kl is None:
+            return stats
+        return stats | {"policy_rate": self._lead(stats["kl"] * calm / config.lead_kl)}
 
     def _lead(self, excess: float) -> float:
         """Slow down after an iteration that went too far, hurry after one that hardly moved; the new rate."""
@@ -278,10 +286,16 @@ class PPO:
         return losses, weigh(scores)
 
     def state_dict(self) -> dict[str, Any]:
-        return {"model": self.model.state_dict(), "optimizer": adam_state(self.optimizer), "pace": self._pace}
+        return {
+            "model": self.model.state_dict(),
+            "optimizer": adam_state(self.optimizer),
+            "pace": self._pace,
+            "iterations": self._iterations,
+        }
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         load_module(self.model, state["model"], "policy and critic")
         load_adam_state(self.optimizer, state["optimizer"])
+        self._iterations = state["iterations"]
         if self.config.lead_kl is not None:
             self._set_pace(state["pace"])

@@ -129,6 +129,28 @@ def test_the_noise_of_a_policy_that_is_always_right_shrinks_if_it_is_learned(rat
     assert (std < 0.18).all() if rate else (std == torch.tensor(0.2).log().exp()).all()
 
 
+def test_the_kl_that_is_asked_for_shrinks_with_the_iterations(generator: torch.Generator) -> None:
+    ppo = make(epochs=2, lead_kl=0.06, kl_halving=20)
+    kls = [ppo.update(rollout(ppo, generator), generator)["kl"] for _ in range(160)]
+    assert sum(kls[60:80]) / 20 == pytest.approx(0.06 / 4.5, rel=0.6)
+    assert sum(kls[120:]) / 40 == pytest.approx(0.06 / 8, rel=0.6)
+    again = make(lead_kl=0.06, kl_halving=20)
+    again.load_state_dict(ppo.state_dict())
+    assert again.state_dict()["iterations"] == 160
+
+
+def test_the_bound_on_the_kl_shrinks_too() -> None:
+    taken = []
+    for halving in (0, 1):
+        generator = torch.Generator().manual_seed(3)
+        ppo = make(epochs=5, target_kl=0.5, kl_halving=halving)
+        for _ in range(30):
+            before = int(ppo.optimizer.state_dict()["state"].get(0, {"step": 0})["step"])
+            ppo.update(rollout(ppo, generator), generator)
+        taken.append(int(ppo.optimizer.state_dict()["state"][0]["step"] - before))
+    assert taken[1] < taken[0] == 15
+
+
 def test_a_led_rate_goes_on_where_it_was(generator: torch.Generator) -> None:
     ppo = make(lead_kl=1e-6)
     for _ in range(3):
