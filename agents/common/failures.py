@@ -24,7 +24,7 @@ class WatchConfig:
     """What counts as a failure, and how long it must last until it is said; as long without it, and it is over.
 
     All is judged on slow means. Patience is counted in iterations, since learning goes by gradient steps. The defaults
-    fit the 150 iterations of the smoke budget as well as the paper's 76,000; only the encoder's is longer than the
+    fit the 300 iterations of the smoke budget as well as the paper's 76,000; only the encoder's is longer than the
     smoke budget, in which an encoder learns next to nothing.
 
     Attributes:

@@ -92,7 +92,7 @@ def test_worlds_that_do_not_divide_are_refused() -> None:
 
 def test_ranks_with_other_settings_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(OTHER, TrainConfig, compose_train(["runner.gamma=0.5"]))
-    with pytest.raises(CommandError, match=r"runner.gamma=0.5: so says rank 1, but rank 0 has 0.99"):
+    with pytest.raises(CommandError, match=r"runner.gamma=0.5: so says rank 1, but rank 0 has 0.95"):
         launch.agreed(Beside(0, 2), lambda: compose_train([]))
     with pytest.raises(SystemExit):
         launch.agreed(Beside(1, 2), lambda: compose_train([]))
