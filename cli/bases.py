@@ -1,7 +1,6 @@
 """`murmillo train base=… to=…` of ASE, CALM and C·ASE: the run that is adapted, and the settings that are its own."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,7 @@ from murmillo.cli.adaptation.words import AGENT, is_adaptnet_run
 from murmillo.cli.agents import checkpoint_meta
 from murmillo.cli.config import TrainConfig
 from murmillo.cli.errors import CommandError, near_names
-from murmillo.cli.foundations import Foundation
+from murmillo.cli.foundations import SkillRun
 from murmillo.cli.tasks.words import is_task_run, value_of
 from murmillo.envs import HumanoidVectorEnv
 
@@ -48,20 +47,8 @@ _FIXED = ("budget", "ablation")
 """Groups whose files were put into the base's settings already."""
 
 
-@dataclass(frozen=True)
-class SkillBase(Foundation):
-    """A run of ASE, CALM or C·ASE from nothing.
-
-    Attributes:
-        config: its settings.
-    """
-
-    config: TrainConfig
-
-    @property
-    def kind(self) -> str:
-        """Its agent's name."""
-        return self.config.choices["agent"]
+class SkillBase(SkillRun):
+    """A run of ASE, CALM or C·ASE from nothing: one that adapts no other."""
 
 
 def find(word: str) -> SkillBase:

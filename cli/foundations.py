@@ -10,6 +10,7 @@ from murmillo.agents.common.base import Base
 from murmillo.agents.common.checkpoint import META, TENSORS
 from murmillo.agents.common.errors import AgentError
 from murmillo.cli import runs
+from murmillo.cli.config import TrainConfig
 from murmillo.cli.errors import CommandError
 from murmillo.cli.evaluation.identity import checkpoint_digest
 from murmillo.envs.character import Character
@@ -62,6 +63,22 @@ class Foundation:
             raise CommandError(f"{setting}={self.word}: {error}") from None
         kept = [output for output in range(character.base.action_dim) if output not in character.pruned]
         return base.pruned(kept) if character.pruned else base
+
+
+@dataclass(frozen=True)
+class SkillRun(Foundation):
+    """A run of ASE, CALM or C·ASE.
+
+    Attributes:
+        config: its settings.
+    """
+
+    config: TrainConfig
+
+    @property
+    def kind(self) -> str:
+        """Its agent's name."""
+        return self.config.choices["agent"]
 
 
 def trained_run(word: str, setting: str) -> Path:

@@ -12,9 +12,8 @@ from murmillo.agents.common.discriminator import (
     Discriminator,
     DiscriminatorConfig,
     Windows,
-    interpolate,
-    slope_penalty,
 )
+from murmillo.agents.common.discriminator_loss import interpolate, slope_penalty
 from murmillo.agents.common.networks import mlp
 from murmillo.agents.common.numbers import check_at_least
 from murmillo.agents.common.ranks import ALONE, Part

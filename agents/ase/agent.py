@@ -10,7 +10,8 @@ from murmillo.agents.ase.config import ASEConfig
 from murmillo.agents.ase.encoder import Encoder
 from murmillo.agents.common.base import EYE, Base, take_over
 from murmillo.agents.common.dimensions import dimensions
-from murmillo.agents.common.discriminator import Discriminator, Windows, discriminator_loss
+from murmillo.agents.common.discriminator import Discriminator, Windows
+from murmillo.agents.common.discriminator_loss import discriminator_loss
 from murmillo.agents.common.exploration import ActionNoise
 from murmillo.agents.common.interface import Demonstrations, Obs, Step
 from murmillo.agents.common.latents import LatentSequence, sample_sphere

@@ -13,7 +13,8 @@ from murmillo.agents.calm.losses import alignment_loss, uniformity_loss
 from murmillo.agents.calm.motions import MotionSequence, cut, select
 from murmillo.agents.common.base import Base, take_over
 from murmillo.agents.common.dimensions import dimensions
-from murmillo.agents.common.discriminator import Discriminator, Windows, discriminator_loss
+from murmillo.agents.common.discriminator import Discriminator, Windows
+from murmillo.agents.common.discriminator_loss import discriminator_loss
 from murmillo.agents.common.exploration import ActionNoise
 from murmillo.agents.common.interface import Demonstrations, Obs, Step
 from murmillo.agents.common.latents import sample_sphere

@@ -11,7 +11,8 @@ from murmillo.agents.case.focal import FocalSampling
 from murmillo.agents.case.networks import Encoder, LabelEmbedding, SkillHeads
 from murmillo.agents.common.base import EYE, Base, take_over
 from murmillo.agents.common.dimensions import dimensions, skill_count
-from murmillo.agents.common.discriminator import Discriminator, Windows, discriminator_loss
+from murmillo.agents.common.discriminator import Discriminator, Windows
+from murmillo.agents.common.discriminator_loss import discriminator_loss
 from murmillo.agents.common.exploration import ActionNoise
 from murmillo.agents.common.interface import Demonstrations, Obs, Step
 from murmillo.agents.common.latents import LatentSequence, sample_sphere

@@ -20,7 +20,7 @@ from murmillo.agents.common.dimensions import skill_count
 from murmillo.agents.common.errors import AgentError
 from murmillo.agents.common.exploration import ActionNoise
 from murmillo.agents.common.networks import GaussianPolicy, linear
-from murmillo.agents.common.ppo import PPOConfig
+from murmillo.agents.common.ppo import PPOConfig, gaussian_settings
 from murmillo.agents.common.ranks import ALONE, Ranks
 from murmillo.agents.common.task_agent import TaskAgent, TaskAgentConfig
 
@@ -86,17 +86,7 @@ class HybridPolicy(GaussianPolicy):
             condition_dim: C, beside the state.
             gumbel: temperature; None for a categorical.
         """
-        super().__init__(
-            state_dim,
-            latent_dim,
-            config.hidden,
-            config.std,
-            generator,
-            condition_dim=condition_dim,
-            style_hidden=config.style_hidden if condition_dim else (),
-            mean_init_scale=config.mean_init_scale,
-            learn_std=config.std_learning_rate > 0,
-        )
+        super().__init__(state_dim, latent_dim, generator=generator, **gaussian_settings(condition_dim, config))
         self.labels = labels
         self.gumbel = gumbel
         self.label_head = linear(config.hidden[-1], labels, generator)

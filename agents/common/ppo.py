@@ -142,17 +142,19 @@ def gaussian_policy(
     state_dim: int, action_dim: int, condition_dim: int, config: PPOConfig, generator: torch.Generator
 ) -> GaussianPolicy:
     """The policy that the config describes, with the condition behind a style network."""
-    return GaussianPolicy(
-        state_dim,
-        action_dim,
-        config.hidden,
-        config.std,
-        generator,
-        condition_dim=condition_dim,
-        style_hidden=config.style_hidden if condition_dim else (),
-        mean_init_scale=config.mean_init_scale,
-        learn_std=config.std_learning_rate > 0,
-    )
+    return GaussianPolicy(state_dim, action_dim, generator=generator, **gaussian_settings(condition_dim, config))
+
+
+def gaussian_settings(condition_dim: int, config: PPOConfig) -> dict[str, Any]:
+    """What `GaussianPolicy` is to be by the config, but for what it acts on and the draw of its weights."""
+    return {
+        "hidden": config.hidden,
+        "std": config.std,
+        "condition_dim": condition_dim,
+        "style_hidden": config.style_hidden if condition_dim else (),
+        "mean_init_scale": config.mean_init_scale,
+        "learn_std": config.std_learning_rate > 0,
+    }
 
 
 class PPO:

@@ -1,6 +1,5 @@
 """The low-level run beneath a high-level policy: found, checked, and known again by its checkpoint."""
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -9,10 +8,9 @@ from murmillo.cli import config as configuration
 from murmillo.cli import foundations, runs
 from murmillo.cli.adaptation.words import is_adaptnet_run
 from murmillo.cli.agents import load_player
-from murmillo.cli.config import TrainConfig
 from murmillo.cli.errors import CommandError
 from murmillo.cli.evaluation.identity import checkpoint_digest
-from murmillo.cli.foundations import Foundation
+from murmillo.cli.foundations import SkillRun
 from murmillo.cli.tasks.words import is_task_run
 from murmillo.envs import EnvConfig, HumanoidVectorEnv
 from murmillo.envs.terrain import is_uneven
@@ -28,20 +26,8 @@ _ITS_OWN = ("character", "window", "residual_force", "residual_reward")
 _SEES = {True: "was adapted to uneven ground, which it sees", False: "was adapted without seeing the ground"}
 
 
-@dataclass(frozen=True)
-class LowRun(Foundation):
-    """A run whose policy is followed.
-
-    Attributes:
-        config: its settings.
-    """
-
-    config: TrainConfig
-
-    @property
-    def kind(self) -> str:
-        """Its agent's name."""
-        return self.config.choices["agent"]
+class LowRun(SkillRun):
+    """A run whose policy is followed."""
 
     def digest(self) -> str:
         """SHA-256 of its checkpoint's tensors."""

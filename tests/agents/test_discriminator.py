@@ -9,10 +9,9 @@ from murmillo.agents.common.discriminator import (
     Discriminator,
     DiscriminatorConfig,
     Windows,
-    discriminator_loss,
-    gradient_penalty,
     style_reward,
 )
+from murmillo.agents.common.discriminator_loss import discriminator_loss, gradient_penalty
 from murmillo.agents.common.errors import AgentError
 
 

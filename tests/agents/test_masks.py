@@ -8,7 +8,8 @@ import pytest
 import torch
 from torch import Tensor
 
-from murmillo.agents.common.discriminator import Discriminator, DiscriminatorConfig, Windows, discriminator_loss
+from murmillo.agents.common.discriminator import Discriminator, DiscriminatorConfig, Windows
+from murmillo.agents.common.discriminator_loss import discriminator_loss
 from murmillo.agents.common.masks import FeatureMasks
 from murmillo.agents.common.normalizer import RunningNormalizer
 from murmillo.agents.common.runner import Runner, RunnerConfig
