@@ -47,4 +47,8 @@ class CommandedSkills:
             drawn = torch.randint(len(self.names), (n,), generator=generator)
         else:
             drawn = torch.multinomial(self._weights, n, replacement=True, generator=generator)
-        self.current = self.current.index_copy(0, env_ids, drawn)
+        self.put(env_ids, drawn)
+
+    def put(self, env_ids: Tensor, skill: Tensor) -> None:
+        """Command these [n] skills in the worlds env_ids [n]."""
+        self.current = self.current.index_copy(0, env_ids, skill)

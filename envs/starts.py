@@ -16,17 +16,19 @@ REFERENCE, DEFAULT, FALLEN, RECOVERY = range(4)
 KINDS = ("reference", "default", "fallen", "recovery")
 
 _MOST_AHEAD = 512
-_STOCKED = ("qpos", "qvel", "frames")
+_STOCKED = ("qpos", "qvel", "frames", "skill")
 
 
 @dataclass
 class StartConfig:
-    """Shares of the starts, as in the published code of ASE.
+    """Shares of the starts, as in the published code of ASE, and of those whose label is known beforehand.
 
     Attributes:
         recovery: of the episodes that ended by a fall, the share that goes on from where it lies.
         fallen: of the other episodes, the share that begins in a fallen state.
         reference: of the rest, the share that begins in a clip; the others begin in the default pose.
+        commanded: of those that begin in a clip, the share that is commanded the clip's label; all others are commanded
+            any (C·ASE, appendix A.4.2), so that of K labels each is begun in its own clips in a share of 1 / K only.
         free_steps: steps in which a recovery or fallen start may lie on the ground (60 steps are 2 s).
         default_height: height of the pelvis in the default pose [m]; with other legs it is higher or lower by as much.
         drop_height: fallen states are dropped from heights of this range [m] (the paper names no range), with other
@@ -37,6 +39,7 @@ class StartConfig:
     recovery: float = 0.2
     fallen: float = 0.1
     reference: float = 0.5
+    commanded: float = 0.0
     free_steps: int = 60
     default_height: float = 0.89
     drop_height: tuple[float, float] = (0.89, 1.4)
@@ -51,12 +54,16 @@ class Starts:
         kind: [n] REFERENCE, DEFAULT, FALLEN or RECOVERY.
         qpos: [n, nq]; qvel: [n, nv].
         frames: [r, W, D] the frames of the clips up to the r reference starts (`Features.recorded`).
+        skill: [r] int64 the labels of these clips.
+        commanded: [r] bool, true where that is the label to command.
     """
 
     kind: Tensor
     qpos: Tensor
     qvel: Tensor
     frames: Tensor
+    skill: Tensor
+    commanded: Tensor
 
 
 class StartSampler:
@@ -72,7 +79,7 @@ class StartSampler:
         threads: int = 0,
     ) -> None:
         """`frames` come with each reference start; `threads` of the physics for the fallen states, 0 for every CPU."""
-        for name in ("recovery", "fallen", "reference"):
+        for name in ("recovery", "fallen", "reference", "commanded"):
             if not 0.0 <= getattr(config, name) <= 1.0:
                 raise SuiteError(f"starts.{name}={getattr(config, name)}: needs a share between 0 and 1")
         if config.fallen_states < 1:
@@ -101,12 +108,15 @@ class StartSampler:
         qpos = self._default.repeat(n, 1)
         qvel = torch.zeros(n, self._character.model.nv, dtype=torch.float64)
         moving = (kinds == REFERENCE).nonzero().squeeze(-1)
-        qpos[moving], qvel[moving], frames = self._references.take(len(moving), generator)
+        qpos[moving], qvel[moving], frames, skill = self._references.take(len(moving), generator)
+        commanded = torch.zeros(len(moving), dtype=torch.bool)
+        if config.commanded:
+            commanded = torch.rand(len(moving), generator=generator) < config.commanded
         fallen = (kinds == FALLEN).nonzero().squeeze(-1)
         if len(fallen):
             pool = self._fallen_states()
             qpos[fallen] = pool[torch.randint(len(pool), (len(fallen),), generator=generator)]
-        return Starts(kinds, qpos, qvel, frames)
+        return Starts(kinds, qpos, qvel, frames, skill, commanded)
 
     def moved(self, starts: Starts, by: Tensor) -> Starts:
         """The starts as they are elsewhere by [n, 3] [m]."""
@@ -160,10 +170,10 @@ class _ReferenceStock:
     def __init__(self, character: Character, library: MotionLibrary, batch: int, frames: int) -> None:
         self._character, self._library, self._batch, self._frames = character, library, batch, frames
         self.stock: tuple[Tensor, ...] | None = None
-        """What is left of qpos [m, nq], qvel [m, nv] and frames [m, W, D]."""
+        """What is left of qpos [m, nq], qvel [m, nv], frames [m, W, D] and skill [m]."""
 
     def take(self, n: int, generator: torch.Generator) -> tuple[Tensor, ...]:
-        """qpos [n, nq], qvel [n, nv] and frames [n, W, D] of n starts."""
+        """qpos [n, nq], qvel [n, nv], frames [n, W, D] and skill [n] of n starts."""
         left = 0 if self.stock is None else len(self.stock[0])
         if self.stock is None or left < n:
             made = self._make(max(self._batch, n - left), generator)
@@ -180,7 +190,7 @@ class _ReferenceStock:
         qpos[:, 2] += lift
         frames = self._library.frames(clip, time, self._frames)
         rise = torch.nn.functional.pad(lift.unsqueeze(-1), (2, 0))
-        return qpos.double(), qvel.double(), self.moved(frames, rise)
+        return qpos.double(), qvel.double(), self.moved(frames, rise), self._library.clip_skill[clip]
 
     def moved(self, frames: Tensor, by: Tensor) -> Tensor:
         """Frames [n, W, D] of the clips, elsewhere by [n, 3] [m]."""

@@ -44,7 +44,8 @@ class HumanoidVectorEnv(VectorEnv):
         state: [N, 120] float32, the table in `murmillo.envs.observations.character_state`; with `features="links"`
             [N, 4, 13 B] (`murmillo.envs.features.LinkFeatures`), of which `length` [N] int64 frames count.
         heights: [N, 35, 35] float32, the ground about the root (only on uneven ground; `Terrain.map`).
-        skill: [N] int64, the commanded label, an index into `skills`; random and independent of the start.
+        skill: [N] int64, the commanded label, an index into `skills`; random and independent of the start, but for the
+            share `starts.commanded` of the starts in a clip.
         window: [N, W, 120] float32, the last W states, oldest first (only if `window` > 1); [N, W, 7 B] of links. After
             a reference start its past is the clip's own, after other starts the first state repeated.
 
@@ -338,6 +339,8 @@ class HumanoidVectorEnv(VectorEnv):
         self._steps[ids] = 0
         self._free_steps[ids] = torch.where(free, self.config.starts.free_steps, 0)
         self._skills.draw(ids, self._generator)
+        own = starts.commanded
+        self._skills.put(ids[starts.kind == REFERENCE][own], starts.skill[own])
         self._ended = self._ended & ~mask
         self.task.reset(ids, self.state, self._generator)
         self._forces.reset(ids, self._generator)

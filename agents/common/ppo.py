@@ -1,5 +1,6 @@
 """Proximal policy optimisation (Schulman et al. 2017) of a policy and a critic that may be told a condition."""
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from itertools import chain
@@ -44,6 +45,7 @@ class PPOConfig:
         std: the policy's standard deviation; the paper's variance is 0.0025.
         std_learning_rate: Adam's step for its logarithm, one for each action dimension; 0 keeps it. Alone they hardly
             move at the rates of weights. AdaptNet's depends on the state and always learns, as weights.
+        std_least: what it does not shrink below, so that something is left to learn from once the character stands.
         noise_correlation: between the noise of one action and the next; the papers' noise is white.
         mean_init_scale: factor on the initial weights of the policy's last layer.
         policy_learning_rate: Adam's step for the policy.
@@ -66,6 +68,7 @@ class PPOConfig:
     style_hidden: tuple[int, ...] = (512, 256)
     std: float = 0.05
     std_learning_rate: float = 0.0
+    std_least: float = 0.0
     noise_correlation: float = 0.0
     mean_init_scale: float = 1.0
     policy_learning_rate: float = 2e-5
@@ -84,7 +87,10 @@ class PPOConfig:
         check_at_least(1, self, "agent.ppo", "epochs", "minibatch")
         check_at_least(0, self, "agent.ppo", "policy_learning_rate", "value_learning_rate", "std_learning_rate")
         check_at_least(0, self, "agent.ppo", "mean_init_scale", "bound_weight", "value_weight", "kl_halving")
+        check_at_least(0, self, "agent.ppo", "std_least")
         check_above_zero(self, "agent.ppo", "std", "clip", "max_grad_norm", "target_kl", "lead_kl")
+        if self.std_least > self.std:
+            raise AgentError(f"agent.ppo.std_least={self.std_least}: needs at most std, {self.std}")
         if not 0 <= self.noise_correlation < 1:
             raise AgentError(f"agent.ppo.noise_correlation={self.noise_correlation}: needs at least 0 and less than 1")
 
@@ -183,6 +189,7 @@ class PPO:
             (model.critic.parameters(), config.value_learning_rate),
             (std, config.std_learning_rate),
         )
+        self._log_std = std
         self._pace = 1.0
         """Of the policy: its learning rate as a multiple of the config's."""
         self._iterations = 0
@@ -236,12 +243,19 @@ class PPO:
             if config.target_kl is not None and rollout.ranks.mean(scores["kl"]) > config.target_kl / calm:
                 break
             minimise(self.optimizer, losses, config.max_grad_norm, ranks=rollout.ranks)
+            self._keep_noise()
         self.model.observe(rollout)
         self._iterations += 1
         stats = means.result(rollout.ranks)
         if config.lead_kl is None:
             return stats
         return stats | {"policy_rate": self._lead(stats["kl"] * calm / config.lead_kl)}
+
+    @torch.no_grad()
+    def _keep_noise(self) -> None:
+        if self.config.std_least:
+            for log_std in self._log_std:
+                log_std.clamp_(min=math.log(self.config.std_least))
 
     def _lead(self, excess: float) -> float:
         """Slow down after an iteration that went too far, hurry after one that hardly moved; the new rate."""

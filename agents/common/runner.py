@@ -22,8 +22,12 @@ from murmillo.agents.common.ranks import ALONE, Ranks
 from murmillo.agents.common.rollout import Rollout, taken, tensors, true_next_obs
 from murmillo.agents.common.watch import Watch
 
-_SAVED = ("meta", "agent", "generator", "samples", "iteration", "watch")
+_SAVED = ("meta", "agent", "generator", "samples", "iteration", "fallen", "watch")
 """What every checkpoint of a run holds; that of its worlds only where the environment has a state."""
+
+
+_MEMORY = 0.02
+"""Of an iteration, in the share of late episodes that ended in a termination."""
 
 
 @dataclass
@@ -40,6 +44,8 @@ class RunnerConfig:
             that there is not. 1 and beta = 0.5 are ASE's. Of an agent with several objectives they weigh not rewards
             but advantages.
         termination_reward: in place of all rewards at a step that terminates (AdaptNet's code: -25); None leaves them.
+        termination_fades: whether that is multiplied by the share of late episodes that did end so: a price that makes
+            the character stand keeps it, once it stands, from trying anything else.
         checkpoint_minutes: save this often, and at the end.
         max_minutes: end after this much time, counted from `run`; None for no limit.
         watch: when to warn that the training fails.
@@ -53,6 +59,7 @@ class RunnerConfig:
     checkpoint_minutes: float = 10.0
     max_minutes: float | None = None
     termination_reward: float | None = None
+    termination_fades: bool = False
     watch: WatchConfig = field(default_factory=WatchConfig)
 
     def __post_init__(self) -> None:
@@ -123,6 +130,8 @@ class Runner:
         self.watch = Watch(config.watch)
         self.samples = 0
         self.iteration = 0
+        self.fallen = 1.0
+        """Share of the late episodes that ended in a termination."""
         self._rollout = Rollout(config.horizon, env.num_envs, ranks)
         self._episodes = EpisodeStatistics(env.num_envs)
         self._obs: dict[str, Tensor] | None = None
@@ -210,7 +219,8 @@ class Runner:
         reward = self._by_objective(terms, weights) if isinstance(self.agent, MultiObjective) else total
         if self.config.termination_reward is not None:
             terminated = rollout["terminated"].view(*rollout.shape, *[1] * (reward.dim() - 2))
-            reward = reward.masked_fill(terminated, self.config.termination_reward)
+            fading = self.fallen if self.config.termination_fades else 1.0
+            reward = reward.masked_fill(terminated, fading * self.config.termination_reward)
         rollout["reward"] = reward
         means = {f"reward/{name}": term.mean().item() for name, term in terms.items()}
         return self.ranks.mean_scalars(means | {"reward/total": total.mean().item()})
@@ -271,6 +281,8 @@ class Runner:
             **(self._healed() if "healed" in self._rollout else {}),
             **scalars,
         }
+        if not math.isnan(rate := stats["episode/fall_rate"]):
+            self.fallen += _MEMORY * (rate - self.fallen)
         if self.logger is not None:
             self.logger.log(self.samples, stats)
         for callback in self.on_iteration:
@@ -291,6 +303,7 @@ class Runner:
             "generator": self.generator.get_state(),
             "samples": self.samples,
             "iteration": self.iteration,
+            "fallen": self.fallen,
             "watch": self.watch.state_dict(),
         }
         if self._obs is not None and hasattr(self.env, "state_dict"):
@@ -314,7 +327,7 @@ class Runner:
             raise AgentError(f"{folder} has no {', '.join(missing)}: it is no run of this version; begin a new one")
         checkpoint.check_compatible(state["meta"], self.meta)
         self.agent.load_state_dict(_placed(state["agent"], self.generator.device))
-        self.samples, self.iteration = state["samples"], state["iteration"]
+        self.samples, self.iteration, self.fallen = state["samples"], state["iteration"], state["fallen"]
         self.generator.set_state(state["generator"])
         self.watch.load_state_dict(state["watch"])
         parts = {"0": state} if "env" in state else state.get("worlds", {})

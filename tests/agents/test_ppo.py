@@ -4,6 +4,7 @@ import pytest
 import torch
 
 from murmillo.agents.common.advantages import normalise_advantage
+from murmillo.agents.common.errors import AgentError
 from murmillo.agents.common.exploration import ActionNoise
 from murmillo.agents.common.losses import action_bound_loss
 from murmillo.agents.common.ppo import PPO, ActorCritic, PPOConfig
@@ -127,6 +128,21 @@ def test_the_noise_of_a_policy_that_is_always_right_shrinks_if_it_is_learned(rat
         ppo.update(batch, generator)
     std = ppo.model.policy.log_std.exp()
     assert (std < 0.18).all() if rate else (std == torch.tensor(0.2).log().exp()).all()
+
+
+def test_the_noise_does_not_shrink_below_its_least() -> None:
+    generator, ppo = torch.Generator().manual_seed(1), make(std_learning_rate=0.1, std_least=0.15)
+    for _ in range(10):
+        batch = rollout(ppo, generator)
+        mean = ppo.model.policy(ppo.model.state_normalizer(batch["state"]))
+        batch["advantage"] = normalise_advantage(-(batch["action"] - mean.detach()).square().sum(-1))
+        ppo.update(batch, generator)
+    torch.testing.assert_close(ppo.model.policy.log_std.exp(), torch.full((2,), 0.15))
+
+
+def test_a_least_noise_above_the_first_is_refused() -> None:
+    with pytest.raises(AgentError, match=r"agent\.ppo\.std_least=0\.06: needs at most std, 0\.05"):
+        PPOConfig(std_least=0.06)
 
 
 def test_the_kl_that_is_asked_for_shrinks_with_the_iterations(generator: torch.Generator) -> None:

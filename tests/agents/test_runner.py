@@ -18,19 +18,24 @@ ITERATION = 32 * 8
 
 def test_n_and_n_more_are_2n_bit_for_bit(tmp_path: Path) -> None:
     straight: list[dict[str, float]] = []
-    whole = make_runner(tmp_path / "whole", samples=6 * ITERATION)
+    price: dict[str, Any] = {"termination_reward": -2.0, "termination_fades": True}
+    whole = make_runner(tmp_path / "whole", samples=6 * ITERATION, **price)
+    whole.env.bound = 0.6  # type: ignore[attr-defined]
     whole.on_iteration = [straight.append]
     whole.run()
 
     halves: list[dict[str, float]] = []
-    first = make_runner(tmp_path / "half", samples=3 * ITERATION)
+    first = make_runner(tmp_path / "half", samples=3 * ITERATION, **price)
+    first.env.bound = 0.6  # type: ignore[attr-defined]
     first.on_iteration = [halves.append]
     first.run()
-    second = make_runner(tmp_path / "half", samples=6 * ITERATION, seed=77)
+    second = make_runner(tmp_path / "half", samples=6 * ITERATION, seed=77, **price)
+    second.env.bound = 0.6  # type: ignore[attr-defined]
     second.on_iteration = [halves.append]
     second.load(tmp_path / "half")
     second.run()
 
+    assert 0 < whole.fallen < 1
     for one, other in zip(straight, halves, strict=True):
         assert {**one, "samples_per_second": 0.0} == pytest.approx(
             {**other, "samples_per_second": 0.0}, rel=0, abs=0, nan_ok=True
@@ -77,6 +82,29 @@ def test_named_rewards_are_weighted_and_logged(tmp_path: Path) -> None:
     means = runner._reward(rollout)
     total = 2 * means["reward/task"] + means["reward/style"] + 0.5 * means["reward/skill"]
     assert means["reward/total"] == pytest.approx(total, rel=1e-5)
+
+
+def test_the_price_of_a_termination_fades_with_their_share_if_that_is_asked(tmp_path: Path) -> None:
+    paid = {}
+    for fades in (False, True):
+        runner = make_runner(tmp_path / str(fades), termination_reward=-8.0, termination_fades=fades, horizon=40)
+        runner.env.bound = 0.52  # type: ignore[attr-defined]
+        rollout = runner._collect()
+        runner._log({}, 1.0)
+        rate = rollout["terminated"].sum() / (rollout["terminated"] | rollout["truncated"]).sum()
+        assert 0 < rate < 1
+        assert runner.fallen == pytest.approx(1 - 0.02 * (1 - rate.item()), rel=1e-5)
+        runner.fallen = 0.25  # some hundred iterations later
+        runner._reward(rollout)
+        paid[fades] = set(rollout["reward"][rollout["terminated"]].tolist())
+    assert paid == {False: {-8.0}, True: {-2.0}}
+
+
+def test_where_no_episode_ended_the_share_stays(tmp_path: Path) -> None:
+    runner = make_runner(tmp_path)
+    runner.fallen = 0.5
+    runner._log({}, 1.0)
+    assert runner.fallen == 0.5
 
 
 def test_side_rewards_of_the_environment_count_where_they_are_weighted(tmp_path: Path) -> None:

@@ -32,6 +32,20 @@ def test_labels_of_new_episodes_follow_the_weights():
     assert len(set(env.reset(seed=0)[0]["skill"])) == len(env.skills)
 
 
+@pytest.mark.parametrize(("share", "own"), [(0.0, 1 / 3), (0.5, 2 / 3), (1.0, 1.0)])
+def test_a_share_of_the_starts_is_commanded_what_its_clip_shows(share: float, own: float):
+    clips = ("guard", "idle_alert", "walk_forward")
+    env = make(400, clips=clips, starts={"reference": 1.0, "fallen": 0.0, "recovery": 0.0, "commanded": share})
+    assert env.skills == clips
+    time = torch.arange(0, 8, 0.05)
+    poses = [env.library.pose(torch.full((len(time),), k), time)[0][:, 7:] for k in range(3)]
+    for seed in (0, None):  # the second also takes what the first has drawn ahead
+        obs, _ = env.reset(seed=seed)
+        pose = env.state.qpos[:, 7:].float()
+        shown = torch.stack([torch.cdist(pose, known).amin(1) for known in poses]).argmin(0)
+        assert (shown.numpy() == obs["skill"]).mean() == pytest.approx(own, abs=0.1)
+
+
 def test_as_many_weights_as_skills():
     env = make(1)
     with pytest.raises(SuiteError, match="one for each of"):

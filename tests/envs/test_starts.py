@@ -43,6 +43,19 @@ def test_a_reference_start_is_the_clips_pose_and_velocity_and_not_in_the_floor(
     assert (starts.qpos[:, 2] >= qpos[:, 2]).all()
 
 
+def test_starts_know_the_labels_of_their_clips(
+    character: Character, library: MotionLibrary, generator: torch.Generator
+) -> None:
+    sample, moments = library.sample, []
+    library.sample = lambda *args: moments.append(sample(*args)) or moments[-1]  # type: ignore[method-assign]
+    starts = StartSampler(character, library, StartConfig(reference=0.5, fallen=0.0, commanded=0.25), 400, 1).draw(
+        torch.zeros(400, dtype=torch.bool), generator
+    )
+    begun = int((starts.kind == REFERENCE).sum())
+    assert torch.equal(starts.skill, library.clip_skill[moments[0][0]][:begun])
+    assert 0.15 < starts.commanded.float().mean() < 0.35
+
+
 def test_only_who_fell_goes_on_from_there(
     character: Character, library: MotionLibrary, generator: torch.Generator
 ) -> None:
