@@ -11,7 +11,7 @@ import torch
 from torch import Tensor, nn
 
 from murmillo.agents.common.errors import AgentError
-from murmillo.agents.common.networks import Dropout, linear, mlp
+from murmillo.agents.common.networks import Dropout, Rectifier, linear, mlp
 from murmillo.agents.common.normalizer import RunningNormalizer
 from murmillo.agents.common.numbers import check_above_zero, check_at_least
 from murmillo.agents.common.ranks import ALONE, Part, Ranks
@@ -135,7 +135,7 @@ class Discriminator(nn.Module):
         # feature cannot be told from its place in it
         self.normalizer = RunningNormalizer((state_dim,))
         sizes = [frames * state_dim + self.condition.inputs, *config.hidden]
-        self.trunk = trunk or mlp(sizes, generator, config.dropout, ranks=ranks)
+        self.trunk = trunk or mlp(sizes, generator, config.dropout, Rectifier, ranks)
         self.dropout = Dropout(config.dropout, generator, ranks)
         # a hinge begins about as steep as its penalty wants it, which else takes a million samples to get it there
         bound = config.slope if config.loss == "hinge" else 1.0

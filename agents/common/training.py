@@ -27,8 +27,10 @@ def minimise(
     The gradient of all parameters together is scaled down to the norm.
     """
     optimizer.zero_grad()
-    torch.stack(list(losses.values())).sum().backward()
     parameters = [p for group in optimizer.param_groups for p in group["params"]]
+    # the inputs that a gradient penalty differentiates by need no gradient of the loss
+    learning = [parameter for parameter in parameters if parameter.requires_grad]
+    torch.stack(list(losses.values())).sum().backward(inputs=learning)
     ranks.average_gradients(parameters)
     if max_grad_norm is not None:
         nn.utils.clip_grad_norm_(parameters, max_grad_norm)

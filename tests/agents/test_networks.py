@@ -1,8 +1,9 @@
 import pytest
 import torch
+from torch import nn
 
 from murmillo.agents.common.errors import AgentError
-from murmillo.agents.common.networks import Dropout, GaussianPolicy, linear, mlp
+from murmillo.agents.common.networks import Dropout, GaussianPolicy, Rectifier, linear, mlp
 
 
 def policy(seed: int = 0, **changes: object) -> GaussianPolicy:
@@ -27,6 +28,26 @@ def test_initial_weights_and_biases(generator: torch.Generator) -> None:
 
 def test_layers_end_in_a_rectifier(generator: torch.Generator) -> None:
     assert mlp([3, 7, 6], generator)(torch.randn(50, 3)).min() == 0
+
+
+def test_the_rectifier_is_pytorchs_but_its_slope_is_a_constant(generator: torch.Generator) -> None:
+    first, last = linear(4, 6, generator), linear(6, 1, generator)
+    points = torch.randn(20, 4, generator=generator)
+    found = []
+    for activation in (nn.ReLU(), Rectifier()):
+        x = points.clone().requires_grad_()
+        hidden = activation(first(x))
+        (slope,) = torch.autograd.grad(last(hidden).sum(), x, create_graph=True)
+        penalty = slope.square().sum()
+        learned = torch.autograd.grad(penalty, [first.weight, last.weight], retain_graph=True)
+        assert min(gradient.abs().max().item() for gradient in learned) > 0
+        found.append([hidden, slope, *learned])
+    assert all(torch.equal(a, b) for a, b in zip(*found, strict=True))
+    # no way back from the penalty through the layer's values, which would cost as much as the gradient itself
+    assert torch.autograd.grad(penalty, x, allow_unused=True) == (None,)
+    edge = torch.tensor([-1.0, 0.0, float("nan")])
+    assert torch.equal(Rectifier()(edge)[:2], edge.new_zeros(2))
+    assert Rectifier()(edge)[2].isnan()
 
 
 def test_dropout_hides_a_share_and_keeps_the_mean_while_training_only(generator: torch.Generator) -> None:
