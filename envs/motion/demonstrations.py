@@ -1,9 +1,12 @@
 """What learners are shown of the clips: windows of states, and states with the action that leads to the next pose."""
 
+from functools import cached_property
+
 import torch
 from torch import Tensor
 
 from murmillo.envs.character import Character
+from murmillo.envs.motion.grid import FrameGrid
 from murmillo.envs.motion.library import MotionLibrary
 
 
@@ -24,9 +27,10 @@ class Demonstrations:
     ) -> dict[str, Tensor]:
         """Windows of the clips, made by the function that makes the observations.
 
-        They end at any time of a clip, and repeat its first frame where they begin before it. If their length is asked
-        for with `frames`, they lie within their clips as far as those are long enough, and end at one of their frames.
-        Of the n that are drawn only `rows` are made, if they are given: the dear part is to make them.
+        They end at any time of a clip, to an eighth of a control step where `FrameGrid` has room for the clips, and
+        repeat its first frame where they begin before it. If their length is asked for with `frames`, they lie within
+        their clips as far as those are long enough, and end at one of their frames. Of the n that are drawn only `rows`
+        are made, if they are given.
 
         Returns:
             window: [n, W, D], 120 wide or as `Features.window` has it; skill: [n] their labels, of the skills [n] asked
@@ -38,8 +42,14 @@ class Demonstrations:
         clip, time = library.sample(n, generator, skill, span, on_frames=frames is not None)
         if rows is not None:
             clip, time = clip[rows], time[rows]
-        drawn = {"window": library.window(clip, time, frames or self._window), "skill": library.clip_skill[clip]}
+        made = self._grid if frames is None and self._grid is not None else library
+        drawn = {"window": made.window(clip, time, frames or self._window), "skill": library.clip_skill[clip]}
         return drawn if library.mask is None else drawn | {"mask": library.mask[clip]}
+
+    @cached_property
+    def _grid(self) -> FrameGrid | None:
+        """Made when windows are first drawn, since not everybody draws any."""
+        return FrameGrid.of(self._library)
 
     def imitation_pairs(self, n: int, generator: torch.Generator) -> dict[str, Tensor]:
         """`state` [n, ...] of the clips on level ground, their `skill` [n], and the `action` [n, A] to the next pose.
