@@ -114,7 +114,9 @@ class AdaptNet:
         for _ in range(config.epochs):
             for rows, part in rollout.minibatches(config.minibatch, generator):
                 drawn = part.drawn(self.demonstrations, generator)
-                agent = Windows(windows[rows], mask=self.masks.draw(len(rows), generator, part=part), part=part)
+                agent = Windows(
+                    windows.index_select(0, rows), mask=self.masks.draw(len(rows), generator, part=part), part=part
+                )
                 demonstration = Windows(drawn["window"], mask=drawn.get("mask"), part=part)
                 loss = hinge_loss(self.discriminator, agent, demonstration, config.gradient_penalty, generator)
                 minimise(self.optimizer, loss.parts, ranks=rollout.ranks)

@@ -132,7 +132,7 @@ class ASE:
         # lines 18-28: encoder and discriminator are one network (section 8.2), so that one loop updates both
         for _ in range(config.discriminator.updates):
             rows, part = rollout.draw(k, generator)
-            agent = windows[rows]
+            agent = windows.index_select(0, rows)
             replay, old = self.replay.sample(k, generator) if len(self.replay) else ({"window": agent}, part)
             drawn = part.drawn(self.demonstrations, generator)
             loss = discriminator_loss(

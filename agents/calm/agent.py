@@ -144,7 +144,8 @@ class CALM:
 
         for _ in range(config.discriminator.updates):
             rows, part = rollout.draw(k, generator)
-            agent = replay = Windows(windows[rows], latents[rows], None if masks is None else masks[rows], part)
+            mask = None if masks is None else masks[rows]
+            agent = replay = Windows(windows.index_select(0, rows), latents[rows], mask, part)
             if len(self.replay):
                 remembered, old = self.replay.sample(k, generator)
                 replay = Windows(**remembered, part=old)

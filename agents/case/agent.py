@@ -159,7 +159,7 @@ class CASE:
 
         for _ in range(config.discriminator.updates):
             rows, part = rollout.draw(k, generator)
-            agent = replay = self._agent_windows(windows[rows], labels[rows], part)
+            agent = replay = self._agent_windows(windows.index_select(0, rows), labels[rows], part)
             if len(self.replay):
                 remembered, old = self.replay.sample(k, generator)
                 replay = self._agent_windows(remembered["window"], remembered["label"], old)

@@ -29,7 +29,8 @@ class RunningNormalizer(nn.Module):
 
     def forward(self, x: Tensor) -> Tensor:
         """Normalise `[..., *shape]` to about unit size, within +-clip."""
-        return ((x - self.mean.to(x.dtype)) / self._std(x)).clamp(-self.clip, self.clip)
+        centred = x - self.mean.to(x.dtype)
+        return centred.div_(self._std(x)).clamp_(-self.clip, self.clip)  # in place: windows are megabytes
 
     def inverse(self, y: Tensor) -> Tensor:
         """Undo `forward`, but for the clipping."""

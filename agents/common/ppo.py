@@ -237,7 +237,7 @@ class PPO:
         calm = 1 + self._iterations / config.kl_halving if config.kl_halving else 1.0
         passes = [rollout.minibatches(config.minibatch, generator) for _ in range(config.epochs)]
         for rows, part in chain.from_iterable(passes):
-            batch = Minibatch({name: value[rows] for name, value in data.items()}, part)
+            batch = Minibatch({name: value.index_select(0, rows) for name, value in data.items()}, part)
             losses, scores = self._losses(batch, condition(batch), extra_loss, other_loss)
             means.add({**losses, **scores})
             if config.target_kl is not None and rollout.ranks.mean(scores["kl"]) > config.target_kl / calm:

@@ -69,7 +69,7 @@ class Replay:
         if self.ranks.size > 1:
             part = self.ranks.part(n, self._own[rows].nonzero().flatten())
             rows = part.of(rows)
-        return {name: value[rows] for name, value in self._fields.items()}, part
+        return {name: value.index_select(0, rows) for name, value in self._fields.items()}, part
 
     def state_dict(self) -> dict[str, Any]:
         """The whole replay; all ranks must ask for it."""

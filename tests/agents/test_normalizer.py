@@ -22,6 +22,17 @@ def test_before_the_first_batch_it_only_clips() -> None:
     torch.testing.assert_close(RunningNormalizer()(x), torch.tensor([-5.0, 0.5, 5.0]), atol=1e-5, rtol=1e-5)
 
 
+def test_what_is_normalised_stays_as_it_is_and_has_a_gradient() -> None:
+    normalizer = RunningNormalizer()
+    normalizer.update(torch.tensor([1.0, 5.0]))  # mean 3, standard deviation 2
+    x = torch.tensor([4.0, 90.0], requires_grad=True)
+    y = normalizer(x)
+    y.sum().backward()
+    assert x.tolist() == [4.0, 90.0]
+    assert x.grad is not None
+    torch.testing.assert_close(x.grad, torch.tensor([0.5, 0.0]), atol=1e-5, rtol=0)  # none beyond the clip
+
+
 def test_inverse_and_float32(generator: torch.Generator) -> None:
     normalizer = RunningNormalizer()
     x = 3 + 2 * torch.randn(100, generator=generator)
