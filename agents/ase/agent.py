@@ -130,7 +130,7 @@ class ASE:
         k = config.discriminator.minibatch
 
         # lines 18-28: encoder and discriminator are one network (section 8.2), so that one loop updates both
-        for _ in range(config.discriminator.updates):
+        for update in range(config.discriminator.updates):
             rows, part = rollout.draw(k, generator)
             agent = windows.index_select(0, rows)
             replay, old = self.replay.sample(k, generator) if len(self.replay) else ({"window": agent}, part)
@@ -141,6 +141,7 @@ class ASE:
                 replay=Windows(replay["window"], mask=self.masks.draw(k, generator, part=old), part=old),
                 demonstration=Windows(drawn["window"], mask=drawn.get("mask"), part=part),
                 generator=generator,
+                update=update,
             )
             losses = dict(loss.parts)
             if config.skill_discovery and not self.base:

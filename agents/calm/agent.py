@@ -142,7 +142,7 @@ class CALM:
         k = config.discriminator.minibatch
         pool = self._draw_motions(config.encoder.pool, config.encoder.frames + config.encoder.shift)
 
-        for _ in range(config.discriminator.updates):
+        for update in range(config.discriminator.updates):
             rows, part = rollout.draw(k, generator)
             mask = None if masks is None else masks[rows]
             agent = replay = Windows(windows.index_select(0, rows), latents[rows], mask, part)
@@ -151,7 +151,9 @@ class CALM:
                 replay = Windows(**remembered, part=old)
             demonstration = self._encoded_demonstration(pool, part)
             negative = self._negative(demonstration)
-            loss = discriminator_loss(self.discriminator, agent, replay, demonstration, negative, generator=generator)
+            loss = discriminator_loss(
+                self.discriminator, agent, replay, demonstration, negative, generator=generator, update=update
+            )
             minimise(self.optimizer, loss.parts, ranks=rollout.ranks)
             means.add({**loss.parts, **loss.scores})
         means.add({"agent_mismatched_score": self._mismatched_score(agent)})

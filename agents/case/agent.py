@@ -157,14 +157,16 @@ class CASE:
         windows, labels, latents = (rollout.flat(name) for name in ("next_window", "label", "latent"))
         k = config.discriminator.minibatch
 
-        for _ in range(config.discriminator.updates):
+        for update in range(config.discriminator.updates):
             rows, part = rollout.draw(k, generator)
             agent = replay = self._agent_windows(windows.index_select(0, rows), labels[rows], part)
             if len(self.replay):
                 remembered, old = self.replay.sample(k, generator)
                 replay = self._agent_windows(remembered["window"], remembered["label"], old)
             demonstration = self._draw_demonstrations(part)
-            loss = discriminator_loss(self.discriminator, agent, replay, demonstration, generator=generator)
+            loss = discriminator_loss(
+                self.discriminator, agent, replay, demonstration, generator=generator, update=update
+            )
             losses = dict(loss.parts)
             if config.skill_discovery and not self.base:
                 mu_q = self.encoder(loss.agent_inputs, labels[rows])

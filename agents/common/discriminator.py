@@ -30,6 +30,9 @@ class DiscriminatorConfig:
         updates: steps an iteration; the released code takes one with every policy minibatch, 8 x 6 = 48.
         loss: "logistic", as ASE, CALM and C·ASE were published, or the "hinge" of AdaptNet (its eq. 10).
         gradient_penalty: w_gp of eq. 14, on the logit's gradient at the normalised demonstrations; of a hinge lambda.
+        penalty_every: the gradient penalty is a part of every so-manieth update's loss, with so many times its weight
+            ("lazy regularisation", Karras et al. 2020, section 4.1, StyleGAN2); it must divide `updates`. 1 is as
+            published.
         slope: norm of the gradient that a hinge's penalty leads to; AdaptNet's ensemble leads its sum to 1, each of
             16 discriminators to a sixteenth.
         logit_decay: on the squared weights of the last layer (released code).
@@ -46,6 +49,7 @@ class DiscriminatorConfig:
     updates: int = 48
     loss: str = "logistic"
     gradient_penalty: float = 5.0
+    penalty_every: int = 1
     slope: float = 0.0625
     logit_decay: float = 0.01
     weight_decay: float = 1e-4
@@ -54,11 +58,15 @@ class DiscriminatorConfig:
     dropout: float = 0.0
 
     def __post_init__(self) -> None:
-        check_at_least(1, self, "agent.discriminator", "minibatch", "updates")
+        check_at_least(1, self, "agent.discriminator", "minibatch", "updates", "penalty_every")
         check_at_least(
             0, self, "agent.discriminator", "learning_rate", "gradient_penalty", "logit_decay", "weight_decay"
         )
         check_above_zero(self, "agent.discriminator", "slope")
+        if self.updates % self.penalty_every:
+            raise AgentError(
+                f"agent.discriminator.penalty_every={self.penalty_every}: needs a divisor of updates={self.updates}"
+            )
         if self.loss not in LOSSES:
             raise AgentError(f"agent.discriminator.loss={self.loss} is not one of {', '.join(LOSSES)}")
 

@@ -33,6 +33,7 @@ def discriminator_loss(
     negative: Windows | None = None,
     *,
     generator: torch.Generator,
+    update: int = 0,
 ) -> DiscriminatorLoss:
     """ASE's eq. 14 with the regularisers of the released code, as named parts whose sum is minimised.
 
@@ -48,12 +49,17 @@ def discriminator_loss(
     E (||d logit / dx|| / slope - 1)^2 at windows that `generator` draws between those of the agent and of the
     demonstrations, of which there must be equally many, under the condition of the latter: such a discriminator goes
     on telling better from worse where the other is sure of both.
+
+    With `penalty_every` = k, P counts in the updates 0, k, 2 k, ... of an iteration alone, k times as much, and is 0 in
+    the others; `update` says which this is.
     """
     config = discriminator.config
     hinge = config.loss == "hinge"
+    penalised = update % config.penalty_every == 0
     loss = _hinge if hinge else F.softplus
     discriminator.train()  # dropout is for these losses only
-    x, told = discriminator.normalizer(demonstration.window).requires_grad_(not hinge), demonstration.condition
+    x, told = discriminator.normalizer(demonstration.window), demonstration.condition
+    x.requires_grad_(penalised and not hinge)
     demo_inputs = leave_out(x, demonstration.mask).flatten(1)
     demo_logits = discriminator.judge(discriminator.features(demo_inputs, told), told)
     agent_inputs = discriminator.prepare(agent.window, agent.mask)
@@ -64,7 +70,9 @@ def discriminator_loss(
     fakes = {"agent": (agent, agent_logits), "replay": (replay, replay_logits)}
     if negative is not None:
         fakes["negative"] = negative, discriminator.logits(*negative[:3])
-    if hinge:
+    if not penalised:
+        penalty = demo_logits.new_zeros(())
+    elif hinge:
         between = interpolate(agent_inputs, demo_inputs, demonstration.part, generator)
         seen = leave_out(between.view_as(x), demonstration.mask).flatten(1)
         logits = discriminator.judge(discriminator.features(seen, told), told)
@@ -82,7 +90,7 @@ def discriminator_loss(
             for name, (windows, logits) in fakes.items()
         },
         "demonstration": 0.5 * real * loss(-demo_logits).mean(),
-        "gradient_penalty": config.gradient_penalty * real * penalty,
+        "gradient_penalty": config.penalty_every * config.gradient_penalty * real * penalty,
         "logit_decay": config.logit_decay * logit_square,
         "weight_decay": config.weight_decay * (logit_square + sum(weight.square().sum() for weight in weights)),
     }

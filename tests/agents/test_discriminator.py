@@ -1,4 +1,7 @@
 import math
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
 
 import pytest
 import torch
@@ -13,6 +16,7 @@ from murmillo.agents.common.discriminator import (
 )
 from murmillo.agents.common.discriminator_loss import discriminator_loss, gradient_penalty
 from murmillo.agents.common.errors import AgentError
+from tests.agents.toy import make_ase, make_calm, make_case, make_runner, small_ase
 
 
 def make(
@@ -231,3 +235,45 @@ def test_a_condition_plugs_in_without_a_new_loss(strategy: Condition, told: Tens
     parts = discriminator_loss(discriminator, sample, sample, sample, generator=generator).parts
     torch.stack(list(parts.values())).sum().backward()
     assert all(parameter.grad is not None for parameter in discriminator.parameters())
+
+
+def test_a_penalty_now_and_then_weighs_as_much_as_one_always(generator: torch.Generator) -> None:
+    fake, real = (Windows(torch.randn(50, 2, 3, generator=generator)) for _ in range(2))
+    for loss_name in ("logistic", "hinge"):
+        always, seldom = (
+            Discriminator(
+                2,
+                3,
+                DiscriminatorConfig(hidden=(8, 4), loss=loss_name, updates=8, penalty_every=every),
+                torch.Generator().manual_seed(1),
+            )
+            for every in (1, 4)
+        )
+        penalties: dict[int, list[float]] = {1: [], 4: []}
+        for update in range(8):
+            for discriminator in (always, seldom):
+                draw = torch.Generator().manual_seed(2)
+                parts = discriminator_loss(discriminator, fake, fake, real, generator=draw, update=update).parts
+                penalties[discriminator.config.penalty_every].append(parts["gradient_penalty"].item())
+                assert parts["demonstration"] > 0
+        assert [penalty > 0 for penalty in penalties[4]] == [True, False, False, False] * 2
+        assert sum(penalties[4]) == pytest.approx(sum(penalties[1]))
+
+
+def test_a_penalty_that_no_iteration_has_evenly_is_refused() -> None:
+    with pytest.raises(AgentError, match=r"agent\.discriminator\.penalty_every=3: needs a divisor of updates=8"):
+        DiscriminatorConfig(updates=8, penalty_every=3)
+    with pytest.raises(AgentError, match=r"agent\.discriminator\.penalty_every=0: needs at least 1"):
+        DiscriminatorConfig(penalty_every=0)
+
+
+@pytest.mark.parametrize("make", [make_ase, make_calm, make_case])
+def test_every_agent_says_which_update_it_is(make: Callable, tmp_path: Path) -> None:
+    penalties = []
+    for every in (1, 8):
+        config = replace(small_ase().discriminator, updates=8, penalty_every=every)
+        weights = {"style": 1.0} if make is make_calm else {"style": 1.0, "skill": 0.5}
+        runner = make_runner(tmp_path, make=make, samples=1, agent={"discriminator": config}, reward_weights=weights)
+        runner.on_iteration = [lambda stats: penalties.append(stats["discriminator/gradient_penalty"])]
+        runner.run()
+    assert 0 < penalties[1] < 4 * penalties[0]  # eight times it, were all eight taken for the first
