@@ -8,12 +8,11 @@ from torch import Tensor
 
 from murmillo.agents.adaptnet.config import AdaptNetConfig
 from murmillo.agents.adaptnet.ensemble import Ensemble, hinge_loss, imitation_reward
-from murmillo.agents.adaptnet.merge import merge
-from murmillo.agents.adaptnet.model import make_model
+from murmillo.agents.adaptnet.model import HistoryActorCritic, make_model
 from murmillo.agents.adaptnet.spaces import Observed
 from murmillo.agents.common.adaptation import announce, penalties
-from murmillo.agents.common.adapter import AdaptedPolicy
-from murmillo.agents.common.base import Base
+from murmillo.agents.common.base import MERGED, Base
+from murmillo.agents.common.blending import Blending, another_base
 from murmillo.agents.common.discriminator import Windows
 from murmillo.agents.common.errors import AgentError
 from murmillo.agents.common.exploration import ActionNoise
@@ -26,7 +25,7 @@ from murmillo.agents.common.rollout import Rollout
 from murmillo.agents.common.training import Means, adam, load_parts, minimise, named, state_of
 
 
-class AdaptNet:
+class AdaptNet(Blending):
     """A policy that reaches a goal in the style of the demonstrations; with a base, an adaptation of that.
 
     Goal and style have critics of their own, and the policy follows the sum of their normalised advantages (eq. 9). An
@@ -34,6 +33,7 @@ class AdaptNet:
     """
 
     objectives = ("task", "imitation")
+    model: HistoryActorCritic
 
     def __init__(
         self,
@@ -79,7 +79,6 @@ class AdaptNet:
             "discriminator": self.discriminator,
             "optimizer": self.optimizer,
         }
-        self._playing = False
 
     def act(self, obs: Obs, *, deterministic: bool = False) -> Step:
         told = self.observed.beside(obs)
@@ -107,8 +106,7 @@ class AdaptNet:
         Raises:
             AgentError: the policy was blended of two or merged, and is for playing only.
         """
-        if self._playing:
-            raise AgentError("a policy with two adapters, or merged with them, is for playing and learns no more")
+        self._check_learning()
         generator, config, means = self.generator, self.config.discriminator, Means()
         windows = rollout.flat("next_window")
         for _ in range(config.epochs):
@@ -132,49 +130,13 @@ class AdaptNet:
         self._observe_demonstrations()
         return named("discriminator", means.result(rollout.ranks)) | named("ppo", ppo)
 
-    def blend(self, alpha: float) -> None:
-        """How much of the adaptation acts, in [0, 1]; of two, alpha of the first and 1 - alpha of the second.
-
-        Raises:
-            AgentError: alpha is outside, or the policy is no adapted one.
-        """
-        self._adapted("blended").blend(alpha)
-
-    def join(self, other: "AdaptNet") -> None:
-        """Take in the adapter of another adaptation of the same base, to blend the two.
-
-        Raises:
-            AgentError: it adapts another base.
-        """
-        own, theirs = self._adapted("joined"), other._adapted("joined")
-        if self.base != other.base:
-            raise AgentError(f"{_another(other.base, self.base)}; adapters of one base alone can be blended")
-        own.join(theirs.adapters[0])
-        self.model.state_normalizer.normalizers.append(other.model.state_normalizer.normalizers[1])
-        self._playing = True
-
-    def merge(self) -> None:
-        """Make one network of policy and adapters, as they are blended now; it acts the same, to 1e-5.
-
-        Raises:
-            AgentError: the adapters are of a kind that cannot be merged.
-        """
-        self.model.policy = merge(self._adapted("merged"))
-        self._playing = True
-
     def state_dict(self) -> dict[str, Any]:
-        return {**state_of(self._parts), "base": self.base}
+        return {**state_of(self._parts), **self._merged_state(), "base": self.base}
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
-        if "base" in state and state["base"] != self.base:
-            raise AgentError(f"{_another(state['base'], self.base)}; name the base that it was trained on")
+        if MERGED not in state and "base" in state and state["base"] != self.base:
+            raise AgentError(f"{another_base(state['base'], self.base)}; name the base that it was trained on")
         load_parts(self._parts, state)
-
-    def _adapted(self, what: str) -> AdaptedPolicy:
-        policy = self.model.policy
-        if not isinstance(policy, AdaptedPolicy):
-            raise AgentError(f"a policy without adapters cannot be {what}; adapt one with agent.method=adaptnet")
-        return policy
 
     def _observe_demonstrations(self) -> None:
         drawn = self.demonstrations(self.config.discriminator.minibatch, self.generator)
@@ -191,8 +153,3 @@ class AdaptNet:
             squares = torch.stack([parameter.square().sum() for parameter in policy.parameters()])
             return {"decay": config.weight_decay * squares.sum()}
         return penalties(policy, batch, config)
-
-
-def _another(theirs: str | None, ours: str | None) -> str:
-    shown = [digest[:12] if digest else "none" for digest in (theirs, ours)]
-    return f"the adapter's base is another policy (digest {shown[0]}) than this one's ({shown[1]})"

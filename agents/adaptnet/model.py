@@ -6,7 +6,7 @@ from torch import Tensor
 from murmillo.agents.adaptnet.config import AdaptNetConfig
 from murmillo.agents.adaptnet.networks import LENGTH, HistoryCritic, HistoryEncoder, ProgressivePolicy, RecurrentPolicy
 from murmillo.agents.adaptnet.spaces import Observed
-from murmillo.agents.common.adapter import AdaptedPolicy, Adapter, Views
+from murmillo.agents.common.adapter import Adapter, Views
 from murmillo.agents.common.base import Base
 from murmillo.agents.common.errors import AgentError
 from murmillo.agents.common.heights import HEIGHTS, HeightMapEncoder
@@ -79,16 +79,19 @@ def make_model(
             "the base acts by a map of heights, the environment shows none; give it uneven ground, or name another base"
         )
     encoder = _encoder(observed, config, generator, seen_maps)
-    own, views = base.adopt(RecurrentPolicy(encoder, observed.action_dim, hidden, std, generator), observed.state_dim)
-    if config.method == "finetune":
-        return HistoryActorCritic(observed, own, views.normalizers[1], objectives, config, generator)
-    if config.method == "progressive":
-        encoder = _encoder(observed, config, generator, maps)
-        policy = ProgressivePolicy(own, encoder, hidden, std, generator)
-    else:
+    plain = RecurrentPolicy(encoder, observed.action_dim, hidden, std, generator)
+    if config.method == "adaptnet":
         control = HeightMapEncoder(generator) if maps and not seen_maps else None
         size = HeightMapEncoder.size if control is not None else 0
-        policy = AdaptedPolicy(own, Adapter(own, config.adapter, generator, control, size))
+        policy, views = base.adapted(
+            plain, observed.state_dim, lambda own: Adapter(own, config.adapter, generator, control, size)
+        )
+        return HistoryActorCritic(observed, policy, views, objectives, config, generator)
+    own, views = base.adopt(plain, observed.state_dim)
+    if config.method == "finetune":
+        return HistoryActorCritic(observed, own, views.normalizers[1], objectives, config, generator)
+    encoder = _encoder(observed, config, generator, maps)
+    policy = ProgressivePolicy(own, encoder, hidden, std, generator)
     return HistoryActorCritic(observed, policy, views, objectives, config, generator)
 
 

@@ -9,6 +9,7 @@ from torch import Tensor
 from murmillo.agents.ase.config import ASEConfig
 from murmillo.agents.ase.encoder import Encoder
 from murmillo.agents.common.base import EYE, Base, take_over
+from murmillo.agents.common.blending import Blending
 from murmillo.agents.common.dimensions import dimensions
 from murmillo.agents.common.discriminator import Discriminator, Windows
 from murmillo.agents.common.discriminator_loss import discriminator_loss
@@ -25,11 +26,13 @@ from murmillo.agents.common.skill_model import SkillModel
 from murmillo.agents.common.training import Means, adam, load_parts, minimise, named, state_of
 
 
-class ASE:
+class ASE(Blending):
     """A policy pi(a | s, z) that behaves like the demonstrations, and differently for every latent z on the sphere.
 
     With a base it adapts that: what each latent is for is still said by the base's encoder (`SkillModel`).
     """
+
+    model: SkillModel
 
     def __init__(
         self,
@@ -125,6 +128,7 @@ class ASE:
 
     def update(self, rollout: Rollout) -> dict[str, float]:
         """Lines 18-29 of Algorithm 1."""
+        self._check_learning()
         config, generator, means = self.config, self.generator, Means()
         windows, latents = rollout.flat("next_window"), rollout.flat("latent")
         k = config.discriminator.minibatch
@@ -190,7 +194,7 @@ class ASE:
         return {"diversity": config.diversity_weight * loss}
 
     def state_dict(self) -> dict[str, Any]:
-        return state_of(self._parts)
+        return {**state_of(self._parts), **self._merged_state()}
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         load_parts(self._parts, state)

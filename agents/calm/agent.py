@@ -12,6 +12,7 @@ from murmillo.agents.calm.encoder import MotionEncoder
 from murmillo.agents.calm.losses import alignment_loss, uniformity_loss
 from murmillo.agents.calm.motions import MotionSequence, cut, select
 from murmillo.agents.common.base import Base, take_over
+from murmillo.agents.common.blending import Blending
 from murmillo.agents.common.dimensions import dimensions
 from murmillo.agents.common.discriminator import Discriminator, Windows
 from murmillo.agents.common.discriminator_loss import discriminator_loss
@@ -26,11 +27,13 @@ from murmillo.agents.common.skill_model import SkillModel
 from murmillo.agents.common.training import Means, adam, load_parts, minimise, named, state_of
 
 
-class CALM:
+class CALM(Blending):
     """A policy pi(a | s, z) that follows the motion M whose encoding z = E(M) it is given.
 
     With a base it adapts that, and goes on following what the base's encoder makes of motions (`SkillModel`).
     """
+
+    model: SkillModel
 
     def __init__(
         self,
@@ -136,6 +139,7 @@ class CALM:
 
     def update(self, rollout: Rollout) -> dict[str, float]:
         """Eq. 7 for the discriminator; eq. 4 with eqs. 5 and 6 for policy, critic and encoder."""
+        self._check_learning()
         config, generator, means = self.config, self.generator, Means()
         windows, latents = rollout.flat("next_window"), rollout.flat("latent")
         masks = rollout.flat("mask") if "mask" in rollout else None
@@ -242,7 +246,7 @@ class CALM:
         self.encoder.normalizer.update(drawn["window"], None if mask is None else mask[:, None])
 
     def state_dict(self) -> dict[str, Any]:
-        return state_of(self._parts)
+        return {**state_of(self._parts), **self._merged_state()}
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         load_parts(self._parts, state)

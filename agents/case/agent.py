@@ -10,6 +10,7 @@ from murmillo.agents.case.config import CASEConfig
 from murmillo.agents.case.focal import FocalSampling
 from murmillo.agents.case.networks import Encoder, LabelEmbedding, SkillHeads
 from murmillo.agents.common.base import EYE, Base, take_over
+from murmillo.agents.common.blending import Blending
 from murmillo.agents.common.dimensions import dimensions, skill_count
 from murmillo.agents.common.discriminator import Discriminator, Windows
 from murmillo.agents.common.discriminator_loss import discriminator_loss
@@ -26,7 +27,7 @@ from murmillo.agents.common.skill_model import SkillModel
 from murmillo.agents.common.training import Means, adam, load_module, load_parts, minimise, named, state_of
 
 
-class CASE:
+class CASE(Blending):
     """A policy pi(a | s, z, c) that behaves like the demonstrations of skill c, and differently for every latent z.
 
     The label c is the environment's observation "skill": who sets it commands the character, at any step. While
@@ -35,6 +36,8 @@ class CASE:
 
     With a base it adapts that, and the labels go on meaning what they meant (`SkillModel`).
     """
+
+    model: SkillModel
 
     def __init__(
         self,
@@ -153,6 +156,7 @@ class CASE:
 
     def update(self, rollout: Rollout) -> dict[str, float]:
         """Learn D by eq. 1 and q by eq. 2, pi and V by eq. 3, and what to practise by eq. 4."""
+        self._check_learning()
         config, generator, means = self.config, self.generator, Means()
         windows, labels, latents = (rollout.flat(name) for name in ("next_window", "label", "latent"))
         k = config.discriminator.minibatch
@@ -273,7 +277,12 @@ class CASE:
         return {"diversity": config.diversity_weight * loss}
 
     def state_dict(self) -> dict[str, Any]:
-        return {"label": self.label.state_dict(), **state_of(self._parts), "iterations": self.iterations}
+        return {
+            "label": self.label.state_dict(),
+            **state_of(self._parts),
+            **self._merged_state(),
+            "iterations": self.iterations,
+        }
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         load_module(self.label, state["label"], "label embedding")

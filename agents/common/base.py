@@ -1,7 +1,7 @@
 """The policy that is adapted: its weights, what it was normalised by, and what else gives its conditions a meaning."""
 
 import hashlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -11,8 +11,9 @@ from torch import Tensor, nn
 
 from murmillo.agents.common import checkpoint
 from murmillo.agents.common.adaptation import frozen
-from murmillo.agents.common.adapter import Views
+from murmillo.agents.common.adapter import AdaptedPolicy, Adapter, Views
 from murmillo.agents.common.errors import AgentError
+from murmillo.agents.common.merging import MergedPolicy, Shape
 from murmillo.agents.common.networks import Policy
 from murmillo.agents.common.normalizer import RunningNormalizer
 from murmillo.agents.common.training import load_module
@@ -21,6 +22,9 @@ P = TypeVar("P", bound=Policy)
 
 EYE = "eye"
 """Under this name an adaptation keeps the base's discriminator, in whose units an encoder of skills sees motion."""
+
+MERGED = "merged"
+"""Under this name the state of an agent has the `Shape` of its policy, where that was merged."""
 
 _POLICY, _NORMALIZER = "policy.", "state_normalizer."
 _WITHIN = (f"{_POLICY}base.", f"{_NORMALIZER}normalizers.0.")
@@ -37,11 +41,13 @@ class Base:
         policy: its weights by name.
         normalizer: the statistics of its states.
         parts: states of its agent's other parts by name, an encoder and the like.
+        merged: what stands side by side in it where it was merged with adapters; such a policy is no base any more.
     """
 
     policy: Mapping[str, Tensor]
     normalizer: Mapping[str, Tensor]
     parts: Mapping[str, Any] = field(default_factory=dict)
+    merged: Shape | None = None
 
     @classmethod
     def of(cls, model: Mapping[str, Tensor], parts: Mapping[str, Any] | None = None) -> "Base":
@@ -69,12 +75,21 @@ class Base:
 
     @classmethod
     def within(cls, agent: Mapping[str, Any]) -> "Base | None":
-        """The base that the state of an adaptation has in it; None where an agent adapts none."""
-        model = _model(agent) or {}
-        policy, normalizer = (_under(prefix, model) for prefix in _WITHIN)
-        if "mean" not in normalizer:
+        """The base that the state of an adaptation has in it; None where an agent adapts none.
+
+        Where it was merged, what an agent is made of that can take in this state.
+        """
+        found = cls.beneath(_model(agent) or {})
+        if "mean" not in found.normalizer:
             return None
-        return cls(policy, normalizer, {**agent, "discriminator": agent.get(EYE)})
+        merged = Shape.load(agent[MERGED]) if MERGED in agent else None
+        return replace(found, parts={**agent, "discriminator": agent.get(EYE)}, merged=merged)
+
+    @classmethod
+    def beneath(cls, model: Mapping[str, Tensor]) -> "Base":
+        """What stays frozen in the state of an adapted model."""
+        policy, normalizer = (_under(prefix, model) for prefix in _WITHIN)
+        return cls(policy, normalizer)
 
     @property
     def actions(self) -> int:
@@ -105,6 +120,25 @@ class Base:
         rows = torch.tensor(outputs)
         policy = {name: value[rows] if name in _PER_ACTION else value for name, value in self.policy.items()}
         return replace(self, policy=policy)
+
+    def adapted(self, plain: Policy, state_dim: int, adapter: Callable[[Policy], Adapter]) -> tuple[Policy, Views]:
+        """A policy of the same kind with these weights and an adapter, and the views that it is shown of states `[D]`.
+
+        Where this was merged, a policy and views of that shape, to take in their weights with a checkpoint.
+
+        Args:
+            plain: of the base's kind.
+            state_dim: D.
+            adapter: makes one for the policy.
+
+        Raises:
+            AgentError: the policy has other layers or actions.
+        """
+        if self.merged is not None:
+            views = Views(*(RunningNormalizer((state_dim,)) for _ in range(self.merged.views)))
+            return MergedPolicy(plain, self.merged), views
+        own, views = self.adopt(plain, state_dim)
+        return AdaptedPolicy(own, adapter(own)), views
 
     def adopt(self, policy: P, state_dim: int) -> tuple[P, Views]:
         """Give a policy of the same kind these weights, and show it states `[..., D]` as this one was shown them.

@@ -9,7 +9,7 @@ from gymnasium.vector import VectorEnv
 from torch import Tensor, nn
 
 from murmillo.agents.common.adaptation import AdaptationConfig, announce, penalties
-from murmillo.agents.common.adapter import AdaptedPolicy, Adapter
+from murmillo.agents.common.adapter import Adapter
 from murmillo.agents.common.base import Base
 from murmillo.agents.common.heights import HEIGHTS, HeightMapEncoder, check_map
 from murmillo.agents.common.networks import CONDITION, Critic, Told, by_name
@@ -65,14 +65,14 @@ class SkillModel(ActorCritic):
         if base is None:
             super().__init__(state_dim, action_dim, condition_dim, config.ppo, generator)
         else:
-            own, views = base.adopt(
-                gaussian_policy(state_dim, action_dim, condition_dim, config.ppo, generator), state_dim
-            )
+            plain = gaussian_policy(state_dim, action_dim, condition_dim, config.ppo, generator)
             maps = _shows_heights(env)
             control, other = (HeightMapEncoder(generator) if maps else None for _ in range(2))
-            adapter = Adapter(own, config.adapter, generator, control, HeightMapEncoder.size if control else 0)
+            size = HeightMapEncoder.size if maps else 0
+            policy, views = base.adapted(
+                plain, state_dim, lambda own: Adapter(own, config.adapter, generator, control, size)
+            )
             critic = SightedCritic(state_dim, condition_dim, config.ppo.hidden, generator, other)
-            policy = AdaptedPolicy(own, adapter)
             super().__init__(
                 state_dim,
                 action_dim,

@@ -1,5 +1,6 @@
 import copy
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -7,6 +8,7 @@ import torch
 from torch import Tensor, nn
 
 from murmillo.agents.adaptnet.agent import AdaptNet
+from murmillo.agents.common import checkpoint
 from murmillo.agents.common.adapter import INJECTION, AdaptedPolicy, Adapter, AdapterConfig, affine
 from murmillo.agents.common.base import Base
 from murmillo.agents.common.errors import AgentError
@@ -142,6 +144,25 @@ def test_two_are_merged_as_they_are_blended() -> None:
     before = mean_action(agent, obs)
     agent.merge()
     torch.testing.assert_close(mean_action(agent, obs), before, atol=1e-5, rtol=0)
+
+
+@pytest.mark.parametrize(
+    ("heights", "seen"), [(False, False), (True, False), (True, True)], ids=["flat", "map", "old_map"]
+)
+def test_a_merged_checkpoint_stands_alone(heights: bool, seen: bool, tmp_path: Path) -> None:
+    """It asks for no base, and takes in none that it is not."""
+    agent = adapted("z0_and_z1", make_base(heights=seen), heights=heights)
+    shake(agent)
+    agent.merge()
+    checkpoint.save(tmp_path, {"agent": agent.state_dict()})
+    state = checkpoint.load(tmp_path)["agent"]
+    again = make_adaptnet(Wanderer(16, heights=heights), torch.Generator(), Base.within(state))
+    again.load_state_dict(state)
+    obs = observe(Wanderer(16, heights=heights))
+    assert torch.equal(mean_action(again, obs), mean_action(agent, obs))
+    assert torch.equal(again.value(obs, {}), agent.value(obs, {}))
+    with pytest.raises(AgentError, match="has other layers than the config's"):
+        adapted(base=make_base(heights=seen), heights=heights).load_state_dict(state)
 
 
 def test_what_cannot_be_merged_says_so() -> None:

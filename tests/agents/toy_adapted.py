@@ -51,9 +51,9 @@ def adapted(kind: str) -> Callable[..., Any]:
     return lambda env, generator, **changes: make_adapted(kind, env, generator, **changes)
 
 
-def shake(agent: Any, scale: float = 0.1) -> None:
+def shake(agent: Any, scale: float = 0.1, seed: int = 9) -> None:
     """Move all that training would move in the policy."""
-    generator = torch.Generator().manual_seed(9)
+    generator = torch.Generator().manual_seed(seed)
     with torch.no_grad():
         for parameter in agent.model.policy.adapters.parameters():
             parameter += scale * torch.randn(parameter.shape, generator=generator)
