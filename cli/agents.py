@@ -89,9 +89,10 @@ def load_player(name: str, config: Any, env: HumanoidVectorEnv, seed: int, folde
 
 
 def load_untrained(name: str, config: Any, env: HumanoidVectorEnv, seed: int, folder: Path) -> Any:
-    """The agent of a checkpoint as it was before training: of an adaptation, its base.
+    """The agent of a checkpoint as it was before training: of an adaptation, its base, unless the two were merged.
 
     Raises:
         AgentError: the checkpoint is damaged.
     """
-    return make_agent(name, config, env, seed, base=Base.within(checkpoint.load(folder)["agent"]))[0]
+    base = Base.within(checkpoint.load(folder)["agent"])
+    return make_agent(name, config, env, seed, base=None if base is None or base.merged else base)[0]

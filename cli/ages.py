@@ -6,6 +6,7 @@ from typing import Any
 
 from murmillo.cli import runs, tables
 from murmillo.cli.agents import load_player, load_untrained
+from murmillo.cli.blending import NOTHING, Blend, load_blended
 from murmillo.cli.config import TrainConfig
 from murmillo.cli.devices import for_playing
 from murmillo.cli.encodings import concentration
@@ -13,10 +14,12 @@ from murmillo.cli.rollouts import AGES, measure
 from murmillo.envs import HumanoidVectorEnv
 
 
-def measure_ages(config: TrainConfig, folder: Path, worlds: int, seed: int = 12345) -> dict[str, dict[str, Any]]:
+def measure_ages(
+    config: TrainConfig, folder: Path, worlds: int, seed: int = 12345, blend: Blend = NOTHING
+) -> dict[str, dict[str, Any]]:
     """Measures of the run's policy before training, after the warm start (where there was one) and after training.
 
-    The trained discriminator judges all three.
+    The trained discriminator judges all three. After training the adapters act as was told.
 
     Raises:
         AgentError: there is no checkpoint, or it does not fit.
@@ -30,7 +33,7 @@ def measure_ages(config: TrainConfig, folder: Path, worlds: int, seed: int = 123
         players = {"untrained": load_untrained(*made_of, folder / runs.LAST)}
         if (folder / runs.WARM_STARTED).exists():
             players["warm_started"] = load_player(*made_of, folder / runs.WARM_STARTED)
-        players["trained"] = load_player(*made_of, folder / runs.LAST)
+        players["trained"] = load_blended(config, env, folder / runs.LAST, blend)
         return {
             age: measure(env, player, judge, seed).as_dict() | {"concentration": concentration(env, player)}
             for age, player in players.items()

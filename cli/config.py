@@ -59,7 +59,8 @@ class TrainConfig:
 
     Attributes:
         agent: the chosen agent's configuration.
-        choices: the files of `conf/` that this was put together from, by group.
+        choices: the files of `conf/` that this was put together from, by group; of a merged run also what it was merged
+            of.
         base: folder of the run whose policy is adapted; None learns from nothing. Its settings are those of this run.
         motions: "builtin", a folder of clips or one file.
         clips: names of those of them that are learned, or patterns such as "walk_*"; empty for all.
@@ -114,7 +115,7 @@ def compose_train(words: list[str]) -> TrainConfig:
 def typed(composed: DictConfig, choices: Mapping[str, Any]) -> TrainConfig:
     """The dataclasses of a composed configuration; `choices` are hydra's, by group."""
     values = resolved(composed)
-    chosen = {group: str(choices[group]) for group in GROUPS if group in choices}
+    chosen = {group: str(choices[group]) for group in (*GROUPS, runs.MERGED) if group in choices}
     values["agent"] = build(AGENTS[chosen["agent"]].config, values["agent"], "agent.")
     return build(TrainConfig, {**values, "choices": chosen})
 
@@ -225,6 +226,8 @@ def resume(path: str, words: list[str], load: Callable[[Path, list[str]], T], se
                 "drop this one, or start a new run"
             )
     config: Any = load(folder, words)
+    if (made := config.choices.get(runs.MERGED)) is not None:
+        raise CommandError(f"run.resume={path}: this run was merged of {made} and learns no more; take that one up")
     config.run.root, config.run.name = str(folder.parent), folder.name
     return config
 

@@ -25,6 +25,13 @@ murmillo evaluate: measure a trained agent as the papers do
 Writes evaluation.md, evaluation.html and evaluation/ into the run's folder. What is recorded stays there: the same
 command goes on where it was stopped. docs/metrics.md says how each metric is measured.
 
+Of a run of any method that adapts another (murmillo train base=… to=…), also a part of its adaptation, or two at once:
+
+  alpha          all of it        how much of the adaptation acts, 0 to 1; of two 0.5
+  with           none             folder of another adaptation of the same base, of which 1 - alpha acts
+
+What is found lies in blends/alpha=0.5/ and the like in the run's folder.
+
 Of a run that learned a task (murmillo train task=…): its normalised return beside that of the untrained policy and of
 random latents, in worlds=256 episodes, as a table and in report.md; it takes seed, motions and
 
@@ -61,6 +68,8 @@ class EvaluateConfig:
     worlds: int = 64
     motions: str | None = None
     checkpoint: Literal["last", "all"] = "last"
+    alpha: float | None = None
+    other: str | None = None
 
 
 def run(words: list[str]) -> int:
@@ -68,6 +77,7 @@ def run(words: list[str]) -> int:
     from murmillo.cli import config as configuration
     from murmillo.cli import runs
     from murmillo.cli.adaptation.words import is_adaptnet_run
+    from murmillo.cli.blending import Blend, renamed
     from murmillo.cli.evaluation.bench import Request
     from murmillo.cli.evaluation.evaluating import evaluate
     from murmillo.cli.seeds import check_seed
@@ -85,7 +95,8 @@ def run(words: list[str]) -> int:
         from murmillo.cli.tasks.evaluate import run as evaluate_task
 
         return evaluate_task(words)
-    settings = configuration.parse(EvaluateConfig, [_listed(word) for word in words])
+    settings = configuration.parse(EvaluateConfig, [_listed(word) for word in renamed(words)])
+    blend = Blend(settings.alpha, settings.other)
     trajectories = settings.trajectories
     if trajectories is None:
         trajectories = _QUICK_TRAJECTORIES if settings.metrics == ("quick",) else _TRAJECTORIES
@@ -106,6 +117,7 @@ def run(words: list[str]) -> int:
         settings.worlds,
         settings.motions,
         along=settings.checkpoint == "all",
+        blend=blend,
     )
     try:
         results = evaluate(config, folder, request)
@@ -113,7 +125,7 @@ def run(words: list[str]) -> int:
         print(f"stopped; what is recorded stays, go on with: murmillo evaluate {' '.join(words)}")
         return 130
     _print(results)
-    print(f"the report: {folder / runs.EVALUATED} (and {runs.EVALUATED_HTML}, {runs.METRICS})")
+    print(f"the report: {blend.place(folder) / runs.EVALUATED} (and {runs.EVALUATED_HTML}, {runs.METRICS})")
     return 0
 
 

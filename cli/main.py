@@ -15,6 +15,7 @@ murmillo: simulated sword-and-shield fighters that learn skills from motion clip
   murmillo compare    put runs side by side:         murmillo compare 'runs/*'
   murmillo record     film a trained agent:          murmillo record run=runs/<name>
   murmillo play       steer it in a browser:         murmillo play run=runs/<name>
+  murmillo merge      make one network of an adapted policy: murmillo merge run=runs/<name> into=runs/<new>
   murmillo map        draw the latents of AdaptNet:  murmillo map runs/<base> runs/<style>
   murmillo motions    import motion clips, look at them, label them
   murmillo bench      measure how fast this machine trains
@@ -23,7 +24,7 @@ murmillo: simulated sword-and-shield fighters that learn skills from motion clip
 `murmillo <command> --help` says what a command takes. Settings are written name=value.
 """
 
-COMMANDS = ("train", "evaluate", "compare", "record", "play", "map", "motions", "bench", "doctor")
+COMMANDS = ("train", "evaluate", "compare", "record", "play", "merge", "map", "motions", "bench", "doctor")
 
 
 def main(argv: list[str] | None = None) -> int:

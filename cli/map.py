@@ -38,7 +38,7 @@ def run(words: list[str]) -> int:
     from murmillo.cli.adaptation.world import open_run
     from murmillo.cli.compare import folders, is_setting
     from murmillo.cli.evaluation.identity import checkpoint_digest
-    from murmillo.cli.runs import LAST
+    from murmillo.cli.runs import LAST, MERGED
     from murmillo.cli.seeds import check_seed
     from murmillo.cli.tasks.words import choices_of
 
@@ -53,6 +53,8 @@ def run(words: list[str]) -> int:
     for folder in found:
         if not is_adaptnet_run(str(folder)):
             raise CommandError(f"{folder}: this is no run of agent={AGENT}, which alone have such latents")
+        if (made := choices_of(str(folder)).get(MERGED)) is not None:
+            raise CommandError(f"{folder}: this run was merged of {made} and has its latents no more; name that one")
         if (method := choices_of(str(folder)).get("method")) in ("scratch", "progressive"):
             raise CommandError(f"{folder}: a run of method={method} has latents of its own; name others of its base")
     opened = [open_run(folder) for folder in found]

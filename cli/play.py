@@ -24,6 +24,8 @@ murmillo play: steer a trained character in a browser
   seed      1                of all that is drawn
   motions   the run's own    a folder or file, where the clips have moved
   low       the run's own    of a run that learned a task: folder of the low-level run, where it has moved
+  alpha     all of it        of a run that adapts another: how much of the adaptation acts, 0 to 1; a slider on the page
+  with      none             folder of another adaptation of the same base, of which 1 - alpha acts
 
 What can be told is on the page: skills, latents, clips to follow and to blend, goals, pushes. docs/play.md explains it.
 Needs viser: pip install 'murmillo[play]'
@@ -42,6 +44,14 @@ class PlayConfig:
 
 
 @dataclass
+class AgentPlayConfig(PlayConfig):
+    """What it takes for a run that has learned from clips."""
+
+    alpha: float | None = None
+    other: str | None = None
+
+
+@dataclass
 class TaskPlayConfig(PlayConfig):
     """What it takes for a run that has learned a task."""
 
@@ -55,20 +65,24 @@ def run(words: list[str]) -> int:
     from murmillo.cli import config as configuration
     from murmillo.cli import runs
     from murmillo.cli.adaptation.words import is_adaptnet_run
+    from murmillo.cli.blending import renamed
     from murmillo.cli.seeds import check_seed
     from murmillo.cli.tasks.words import is_task_run, value_of
 
     if is_adaptnet_run(named := value_of(words, "run")):
         raise CommandError(f"run={named}: the page does not steer AdaptNet yet; film it: murmillo record run={named}")
     of_task = is_task_run(value_of(words, "run"))
-    settings = configuration.parse(TaskPlayConfig if of_task else PlayConfig, words)
+    settings = configuration.parse(TaskPlayConfig if of_task else AgentPlayConfig, renamed(words))
     check_seed("seed", settings.seed)
     folder = runs.existing(settings.run, "run")
     _check_address(settings.host, settings.port)
     if importlib.util.find_spec("viser") is None:
         raise CommandError("play: the page needs viser, which is not installed: pip install 'murmillo[play]'")
     torch.set_num_threads(1)  # one world is too little work to share
-    session = _open_task(folder, settings) if isinstance(settings, TaskPlayConfig) else _open_agent(folder, settings)
+    if isinstance(settings, AgentPlayConfig):
+        session = _open_agent(folder, settings)
+    else:
+        session = _open_task(folder, settings)
 
     from murmillo.viewer.serving import serve
 
@@ -84,27 +98,29 @@ def run(words: list[str]) -> int:
     return 0
 
 
-def _open_agent(folder: Path, settings: PlayConfig) -> "Session":
+def _open_agent(folder: Path, settings: AgentPlayConfig) -> "Session":
     """A session with an agent that has learned from clips.
 
     Raises:
         SuiteError: the clips cannot be read.
         AgentError: the checkpoint is missing or does not fit.
+        CommandError: its adapters cannot act as is asked.
     """
     import dataclasses
 
     from murmillo.cli import config as configuration
     from murmillo.cli import runs
-    from murmillo.cli.agents import load_player
+    from murmillo.cli.blending import Blend, load_blended
     from murmillo.cli.devices import for_playing
     from murmillo.envs import HumanoidVectorEnv
     from murmillo.viewer.pilots import AgentPilot
     from murmillo.viewer.session import Session, playable
 
+    blend = Blend(settings.alpha, settings.other)
     config = configuration.load(folder)
     shown = dataclasses.replace(for_playing(config.env), motions=settings.motions or config.env.motions)
     env = HumanoidVectorEnv(1, playable(shown))
-    player = load_player(config.choices["agent"], config.agent, env, config.seed, folder / runs.LAST)
+    player = load_blended(config, env, folder / runs.LAST, blend)
     return Session(env, AgentPilot(player), shown.fall, settings.seed)
 
 

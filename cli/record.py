@@ -36,12 +36,12 @@ murmillo record: film a trained agent
   out       by machine       file, in the run's folder unless it is a path
   style=walk_forward and the like set the machine's parameters; camera, seed and motions as above
 
-  murmillo record run=runs/<adaptation> alpha=0.5     AdaptNet: half way between the base and its adaptation
+  murmillo record run=runs/<adaptation> alpha=0.5     half way between a base, of any method, and its adaptation
   murmillo record run=runs/<one> with=runs/<other> alpha=0.3      0.3 of the one and 0.7 of the other of the same base
 
   alpha     all of it        how much of the adaptation acts, 0 to 1; of two 0.5
   with      none             folder of another adaptation of the same base
-  base      the run's own    folder of the run that it adapts, where it has moved
+  base      the run's own    AdaptNet: folder of the run that it adapts, where it has moved
   seconds, camera, out, seed and motions as above
 
 A run that learned a task is shown with its goals; it follows no clips.
@@ -62,6 +62,8 @@ class RecordConfig:
     out: str = "video.mp4"
     seed: int = 1
     motions: str | None = None
+    alpha: float | None = None
+    other: str | None = None
 
 
 def run(words: list[str]) -> int:
@@ -101,6 +103,7 @@ def _plan(words: list[str]) -> _Film:
     """A machine, a run of AdaptNet, one that has learned a task, or one that has learned from clips."""
     from murmillo.cli import config as configuration
     from murmillo.cli.adaptation.words import is_adaptnet_run
+    from murmillo.cli.blending import Blend, renamed
     from murmillo.cli.tasks.words import is_task_run, value_of
 
     if value_of(words, "machine") is not None:
@@ -119,7 +122,8 @@ def _plan(words: list[str]) -> _Film:
 
         task = configuration.parse(tasks.TaskRecordConfig, words)
         return _Film(task.run, task.seconds, task.out, task.seed, lambda folder, out: tasks.film(folder, task, out))
-    own = configuration.parse(RecordConfig, words)
+    own = configuration.parse(RecordConfig, renamed(words))
+    Blend(own.alpha, own.other)  # a mistake shows before the run is read
     if own.blend and len(own.clips) < 2:
         raise CommandError("blend=true: goes from one clip to the next; name two or more, clips=[walk_forward,kick]")
     return _Film(
@@ -133,6 +137,7 @@ def film(config: Any, folder: Path, settings: RecordConfig, out: Path) -> Path:
     Raises:
         SuiteError: nothing can be drawn, or there is no such skill or camera.
         AgentError: the checkpoint is missing or does not fit.
+        CommandError: its adapters cannot act as is asked.
     """
     import dataclasses
 
@@ -141,7 +146,7 @@ def film(config: Any, folder: Path, settings: RecordConfig, out: Path) -> Path:
 
     from murmillo.agents.common.rollout import tensors
     from murmillo.cli import runs
-    from murmillo.cli.agents import load_player
+    from murmillo.cli.blending import Blend, load_blended
     from murmillo.cli.devices import for_playing
     from murmillo.envs import HumanoidVectorEnv
 
@@ -152,7 +157,7 @@ def film(config: Any, folder: Path, settings: RecordConfig, out: Path) -> Path:
     env = HumanoidVectorEnv(1, shown, render_mode="rgb_array")
     beside = out.with_name(f".{out.stem}.part.mp4")
     try:
-        player = load_player(config.choices["agent"], config.agent, env, config.seed, folder / runs.LAST)
+        player = load_blended(config, env, folder / runs.LAST, Blend(settings.alpha, settings.other))
         obs, _ = env.reset(seed=settings.seed, options={"start": "reference"})
         _command(env, settings.skill)
         follow = _follower(settings, player, env)

@@ -29,7 +29,7 @@ def write(folder: Path) -> Path:
         scalars,
         what=_what(config, scalars),
         found=[
-            _ages(measures, adapted="to" in config.choices),
+            _ages(measures, adapted="to" in config.choices and runs.MERGED not in config.choices),
             obedience.section(measures, runs.read_json(folder / runs.SKILLS, {})),
             encodings.section(measures),
             evaluation.section(runs.read_json(folder / runs.METRICS)),
@@ -81,13 +81,16 @@ def going_on(lines: Sequence[str]) -> str:
     return "\n".join(["## How to go on", "", "```", *lines, "```"])
 
 
-def train_film_measure(folder: Path, scalars: Scalars) -> list[str]:
-    """Commands for a run of a task or of AdaptNet, whatever came of it."""
+def train_film_measure(folder: Path, scalars: Scalars, merged: bool = False) -> list[str]:
+    """Commands for a run of a task or of AdaptNet, whatever came of it; what was `merged` is not trained on."""
     run = shlex.quote(str(folder))
     samples = max(5_000_000, 2 * Effort.of(scalars).samples)
-    return [
+    going_on = [
         "# train this run on, for an hour at most",
         f"murmillo train run.resume={run} runner.max_minutes=60 runner.samples={samples}",
+    ]
+    return [
+        *([] if merged else going_on),
         "# another film, and surer figures",
         f"murmillo record run={run} seconds=20",
         f"murmillo evaluate run={run} worlds=1024",
@@ -132,8 +135,15 @@ def _what(config: Any, scalars: Scalars) -> str:
         f"`{choices.agent}`{changed} {learned} the clips `{config.motions}`{chosen} with the budget "
         f"`{choices.budget}`, seed {config.seed}: {samples:,} samples (control steps of 1/30 s, "
         f"{samples / 30 / 3600:.1f} simulated hours) in {minutes:.1f} minutes, {rate:,.0f} samples/s, "
-        f"in {config.num_envs} worlds."
+        f"in {config.num_envs} worlds.{merged(choices)}"
     )
+
+
+def merged(choices: Any) -> str:
+    """That a run was merged, and of what; nothing of others."""
+    if runs.MERGED not in choices:
+        return ""
+    return f" This run is the policy of `{choices[runs.MERGED]}` and its adapters as one network, which learns no more."
 
 
 def made_on(versions: dict[str, Any]) -> str:
@@ -269,10 +279,12 @@ def meanings(scalars: Scalars, metrics: tuple[Metric, ...] = TRAINING + LABELS) 
 def _going_on(folder: Path, config: Any, scalars: Scalars) -> str:
     samples = Effort.of(scalars).samples
     run = shlex.quote(str(folder))
-    lines = [
-        "# train this run on, for an hour at most",
-        f"murmillo train run.resume={run} runner.max_minutes=60 runner.samples={max(20_000_000, 2 * samples)}",
-    ]
+    lines = []
+    if runs.MERGED not in config.choices:
+        lines += [
+            "# train this run on, for an hour at most",
+            f"murmillo train run.resume={run} runner.max_minutes=60 runner.samples={max(20_000_000, 2 * samples)}",
+        ]
     if config.choices.budget == "smoke" and "to" not in config.choices:
         clips = "" if config.motions == "builtin" else f" {shlex.quote(f'motions={config.motions}')}"
         clips += " " + shlex.quote(f"clips=[{','.join(config.clips)}]") if config.get("clips") else ""

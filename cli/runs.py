@@ -34,6 +34,10 @@ FILMING = "filming.json"
 LAUNCH = "launch.json"
 PLOTS = "plots"
 
+MERGED = "merged"
+"""Among the choices of a run's settings: the adaptation that it was merged of."""
+_NAME = re.compile(r"[\w+=,-][\w.+=,-]{0,199}")
+
 
 def default_name(agent: str, budget: str, seed: int, suffix: str = "") -> str:
     """A name that sorts by time: 2026-01-31_12-00-00-ase-smoke-1."""
@@ -46,7 +50,7 @@ def vacant(root: str, name: str) -> Path:
     Raises:
         CommandError: the name is no name of a folder, or there is such a run already.
     """
-    if not re.fullmatch(r"[\w.+=,-]{1,200}", name) or name.startswith("."):
+    if not _NAME.fullmatch(name):
         raise CommandError(
             f"run.name={name}: a name has up to 200 letters, digits and -_.+=, only; a folder is run.root"
         )
@@ -55,6 +59,22 @@ def vacant(root: str, name: str) -> Path:
         raise CommandError(f"{folder}: there is such a run already; choose another run.name, or run.resume={folder}")
     if os.path.isfile(root):
         raise CommandError(f"run.root={root}: this is a file; name a folder for the runs")
+    return folder
+
+
+def vacant_at(path: str, key: str) -> Path:
+    """The folder of a new run, which is not made yet, in a folder that is there.
+
+    Raises:
+        CommandError: the name is no name of a folder, there is something of that name, or no folder to have it.
+    """
+    folder = Path(path)
+    if not _NAME.fullmatch(folder.name):
+        raise CommandError(f"{key}={path}: the name of a run has up to 200 letters, digits and -_.+=, only")
+    if os.path.lexists(folder):
+        raise CommandError(f"{key}={path}: there is something of this name already; choose another name")
+    if not os.path.isdir(folder.parent):
+        raise CommandError(f"{key}={path}: there is no folder {folder.parent}; make it, or choose another")
     return folder
 
 

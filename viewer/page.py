@@ -6,6 +6,7 @@ from typing import Any
 
 import viser
 
+from murmillo.agents.common.blending import Blending
 from murmillo.viewer.goals import DIRECTION, FACING, SPEED, TARGET
 from murmillo.viewer.latents import FAVOURITES, Latents
 from murmillo.viewer.loop import Loop
@@ -55,6 +56,8 @@ class Page:
             self._add_skills(session.skills)
         if session.latents is not None:
             self._add_latents(session.latents)
+        if session.adapted is not None:
+            self._add_adaptation(session.adapted)
         if not session.plays_freely:
             self._add_goals(server)
         self._add_push()
@@ -133,6 +136,12 @@ class Page:
 
         for control in (first, second, part):
             self._on_user(control, follow)
+
+    def _add_adaptation(self, adapted: Blending) -> None:
+        ends = "0 is the base, 1 the adaptation" if adapted.adapters == 1 else "0 is the second adaptation, 1 the first"
+        with self._gui.add_folder("Adaptation"):
+            alpha = self._gui.add_slider("Alpha", 0.0, 1.0, 0.01, adapted.alpha, hint=ends)
+        self._on_user(alpha, lambda: self._session.blend(alpha.value))
 
     def _add_goals(self, server: viser.ViserServer) -> None:
         goals = self._session.goals

@@ -4,6 +4,7 @@ from typing import Protocol, runtime_checkable
 
 import torch
 
+from murmillo.agents.common.blending import Blending
 from murmillo.agents.common.decoder import Command
 from murmillo.agents.common.interface import Agent, Labelled, Obs, Steerable, Step
 from murmillo.agents.common.latent_env import LatentEnv
@@ -32,6 +33,11 @@ class Pilot(Protocol):
         ...
 
     @property
+    def adapted(self) -> Blending | None:
+        """Whose adapters may act in part; None where it has none."""
+        ...
+
+    @property
     def heeds_skill(self) -> bool:
         """Whether it does as the observation "skill" says."""
         ...
@@ -51,6 +57,7 @@ class AgentPilot:
     def __init__(self, agent: Agent) -> None:
         self.judge = agent
         self.steerable = agent if isinstance(agent, SteerableAgent) else None
+        self.adapted = _with_adapters(agent)
         self.heeds_skill = isinstance(agent, Labelled)
         self._agent = agent
 
@@ -69,6 +76,7 @@ class PolicyPilot:
     def __init__(self, policy: TaskAgent, decisions: LatentEnv | None) -> None:
         """`decisions` is what the policy was trained in: how long a decision is, what it means, and to whom."""
         self.judge = None if decisions is None else decisions.low
+        self.adapted = _with_adapters(self.judge)
         self.heeds_skill = policy.config.skill
         self._policy, self._decisions = policy, decisions
         self._command: Command | None = None
@@ -87,3 +95,7 @@ class PolicyPilot:
 
     def reset(self) -> None:
         self._command = None
+
+
+def _with_adapters(agent: Agent | None) -> Blending | None:
+    return agent if isinstance(agent, Blending) and agent.adapters else None

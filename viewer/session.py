@@ -83,6 +83,7 @@ class Session:
         skills: labels that can be commanded, which are those that chance may draw; empty where nobody heeds them.
         latents: to be chosen by the user; None where a policy chooses.
         goals: to be set by the user.
+        adapted: whose adapters the user may let act in part; None where there are none.
         plays_freely: there is no task, and so no goal.
         stay_down: leave a fallen character where it lies, instead of beginning a new episode.
     """
@@ -103,6 +104,7 @@ class Session:
         self.skills = tuple(known) if pilot.heeds_skill else ()
         self.latents = None if pilot.steerable is None else Latents(pilot.steerable, env.library)
         self.goals = Goals(env, torch.Generator().manual_seed(seed))
+        self.adapted = pilot.adapted
         self.plays_freely = isinstance(env.task, Imitation)
         self.stay_down = False
         self._pilot = pilot
@@ -134,6 +136,15 @@ class Session:
             # what an episode begins with, and what a task's clock draws
             weights = torch.tensor([float(name == skill) for name in self.env.skills])
         self.env.set_skill_weights(weights)
+
+    def blend(self, alpha: float) -> None:
+        """Let so much of the adaptation act from the next step on, in [0, 1]; of two, 1 - alpha of the second.
+
+        Raises:
+            AgentError: alpha is outside.
+        """
+        if self.adapted is not None:
+            self.adapted.blend(alpha)
 
     def push(self, angle: float, force: float) -> None:
         """Push the root for 0.2 s.

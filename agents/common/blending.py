@@ -27,6 +27,15 @@ class Blending:
         policy = self.model.policy
         return len(policy.adapters) if isinstance(policy, AdaptedPolicy) else 0
 
+    @property
+    def alpha(self) -> float:
+        """How much of the first adapter acts.
+
+        Raises:
+            AgentError: the policy has no adapters.
+        """
+        return self._adapted("blended").strengths[0]
+
     def blend(self, alpha: float) -> None:
         """How much of the adaptation acts, in [0, 1]; of two, alpha of the first and 1 - alpha of the second.
 

@@ -17,6 +17,7 @@ from murmillo.cli.adaptation.base import BaseRun
 from murmillo.cli.adaptation.words import AGENT
 from murmillo.cli.config import check_words, compose_words, merge, reading, resolved, resume, resumed_run
 from murmillo.cli.errors import CommandError, near_names
+from murmillo.cli.runs import MERGED
 from murmillo.cli.schema import build, twin_of
 from murmillo.cli.tasks.config import TaskRunConfig
 from murmillo.cli.tasks.words import value_of
@@ -83,8 +84,11 @@ class AdaptNetTrainConfig:
         return Navigate(self.task)
 
     def find_base(self) -> BaseRun | None:
-        """The run that is adapted. Raises CommandError where it is missing or no base."""
-        return None if self.base is None else base_runs.find(self.base)
+        """The run that is adapted; None where there is none, or it was merged.
+
+        Raises CommandError where it is missing or no base.
+        """
+        return None if self.base is None or MERGED in self.choices else base_runs.find(self.base)
 
 
 def compose_adaptnet(words: list[str]) -> AdaptNetTrainConfig:

@@ -14,20 +14,35 @@ class AdaptNetEvaluateConfig:
     seed: int = 12345
     base: str | None = None
     motions: str | None = None
+    alpha: float | None = None
+    other: str | None = None
 
 
 def run(words: list[str]) -> int:
     """Measure, keep and print the figures, and write the report anew."""
     from murmillo.cli import config as configuration
+    from murmillo.cli import runs
     from murmillo.cli.adaptation import report
     from murmillo.cli.adaptation.evaluating import evaluate
     from murmillo.cli.adaptation.world import open_run
+    from murmillo.cli.blending import Blend, renamed
+    from murmillo.cli.tasks import table
     from murmillo.cli.tasks.evaluate import answer
 
-    settings = configuration.parse(AdaptNetEvaluateConfig, words)
+    settings = configuration.parse(AdaptNetEvaluateConfig, renamed(words))
+    blend = Blend(settings.alpha, settings.other)
 
     def measured(folder: Path) -> dict[str, Any]:
         config, base = open_run(folder, settings.base, settings.motions)
-        return evaluate(config, base, folder, settings.worlds, settings.seed)
+        return evaluate(config, base, folder, settings.worlds, settings.seed, blend)
 
-    return answer(settings, measured, report.write)
+    def write(folder: Path) -> Path:
+        if not blend:
+            return report.write(folder)
+        to = blend.place(folder)
+        results = runs.read_json(to / runs.METRICS)
+        text = f"# {folder.name}, {blend}\n\n{table.markdown(results)}\n\n{table.meanings(results)}\n"
+        runs.write_text(to / runs.EVALUATED, text)
+        return to / runs.EVALUATED
+
+    return answer(settings, measured, write)

@@ -9,14 +9,20 @@ from murmillo.cli.adaptation.base import BaseRun
 from murmillo.cli.adaptation.config import AdaptNetTrainConfig
 from murmillo.cli.adaptation.measuring import measure
 from murmillo.cli.adaptation.world import check_base
+from murmillo.cli.blending import NOTHING, Blend
 from murmillo.cli.tasks import table
 from murmillo.cli.tasks.evaluating import PROTOCOL, SEED, keep
 
 
 def evaluate(
-    config: AdaptNetTrainConfig, base: BaseRun | None, folder: Path, worlds: int, seed: int = SEED
+    config: AdaptNetTrainConfig,
+    base: BaseRun | None,
+    folder: Path,
+    worlds: int,
+    seed: int = SEED,
+    blend: Blend = NOTHING,
 ) -> dict[str, Any]:
-    """Measure the run in `folder` in so many episodes and keep what was found.
+    """Measure the run in `folder` in so many episodes and keep what was found; of a blend, at its own place.
 
     Returns:
         What `evaluation/metrics.json` has.
@@ -27,6 +33,6 @@ def evaluate(
     """
     saved = checkpoint.load(folder / runs.LAST)
     check_base(base, saved)
-    figures = table.entries(measure(config, base, folder, worlds, seed))
+    figures = table.entries(measure(config, base, folder, worlds, seed, blend))
     metrics = {"task": {"title": "Goal and style", "protocols": [PROTOCOL], "figures": figures}}
-    return keep(folder, saved, "navigate", config.choices["agent"], worlds, seed, metrics)
+    return keep(folder, saved, "navigate", config.choices["agent"], worlds, seed, metrics, blend)

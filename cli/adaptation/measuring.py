@@ -10,7 +10,8 @@ from murmillo.agents.adaptnet.agent import AdaptNet
 from murmillo.agents.common.rollout import tensors
 from murmillo.cli.adaptation.base import BaseRun
 from murmillo.cli.adaptation.config import AdaptNetTrainConfig
-from murmillo.cli.adaptation.world import load_agent, make_agent, make_env
+from murmillo.cli.adaptation.world import load_blended, make_agent, make_env
+from murmillo.cli.blending import NOTHING, Blend
 from murmillo.cli.evaluation.figures import Value
 from murmillo.cli.tasks.measuring import Figures, Recorder
 from murmillo.cli.tasks.players import TRAINED, UNTRAINED
@@ -29,9 +30,11 @@ _COMPARED = 32
 
 @torch.no_grad()
 def measure(
-    config: AdaptNetTrainConfig, base: BaseRun | None, folder: Path, worlds: int, seed: int
+    config: AdaptNetTrainConfig, base: BaseRun | None, folder: Path, worlds: int, seed: int, blend: Blend = NOTHING
 ) -> dict[str, Figures]:
     """Figures of the policy before and after training: the same episodes as far as the seed decides, mean actions.
+
+    After training its adapters act as was told.
 
     Raises:
         AgentError: the checkpoint in `folder` is missing or does not fit.
@@ -40,7 +43,7 @@ def measure(
     env = make_env(config, worlds)
     try:
         references = _references(env)
-        players = {UNTRAINED: make_agent(config, base, env)[0], TRAINED: load_agent(config, base, env, folder)}
+        players = {UNTRAINED: make_agent(config, base, env)[0], TRAINED: load_blended(config, base, env, folder, blend)}
         return {name: _play(env, player, references, seed) for name, player in players.items()}
     finally:
         env.close()

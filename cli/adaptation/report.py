@@ -44,7 +44,7 @@ def _what(config: Any, scalars: Scalars) -> str:
     return (
         f"{what}, with the budget `{choices.budget}`, seed {config.seed}: {samples:,} samples (control steps of "
         f"1/30 s, {samples / 30 / 3600:.1f} simulated hours) in {minutes:.1f} minutes, {rate:,.0f} samples/s, in "
-        f"{config.num_envs} worlds."
+        f"{config.num_envs} worlds.{common.merged(choices)}"
     )
 
 
@@ -53,7 +53,7 @@ def _figures(config: Any, results: dict[str, Any] | None, clips: list[str]) -> s
         return ""
     begun = (
         " Before training, an adapted policy acts as its base: that column is the base, put into this world."
-        if config.stage == "adapt" and config.choices.method == "adaptnet"
+        if config.stage == "adapt" and config.choices.method == "adaptnet" and runs.MERGED not in config.choices
         else ""
     )
     return "\n\n".join(
@@ -84,6 +84,8 @@ def _published(results: dict[str, Any], clips: list[str]) -> str:
 
 def _going_on(folder: Path, config: Any, scalars: Scalars) -> str:
     run = shlex.quote(str(folder))
+    if runs.MERGED in config.choices:
+        return common.going_on(common.train_film_measure(folder, scalars, merged=True))
     lines = common.train_film_measure(folder, scalars)
     if config.stage == "base":
         lines += [

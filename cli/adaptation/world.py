@@ -8,10 +8,13 @@ import torch
 
 from murmillo.agents.adaptnet.agent import AdaptNet
 from murmillo.agents.common import checkpoint
+from murmillo.agents.common.base import Base
 from murmillo.agents.common.ranks import ALONE, Ranks
 from murmillo.cli import foundations, runs
 from murmillo.cli.adaptation.base import SETTING, BaseRun
 from murmillo.cli.adaptation.config import SCRATCH, AdaptNetTrainConfig, load
+from murmillo.cli.adaptation.words import AGENT
+from murmillo.cli.blending import Blend
 from murmillo.cli.devices import for_playing, for_training
 from murmillo.cli.errors import CommandError
 from murmillo.envs import HumanoidVectorEnv
@@ -34,15 +37,23 @@ def make_env(
 
 
 def make_agent(
-    config: AdaptNetTrainConfig, base: BaseRun | None, env: HumanoidVectorEnv, ranks: Ranks = ALONE
+    config: AdaptNetTrainConfig,
+    base: BaseRun | None,
+    env: HumanoidVectorEnv,
+    ranks: Ranks = ALONE,
+    within: Base | None = None,
 ) -> tuple[AdaptNet, torch.Generator]:
     """The agent as it is before training, and the generator that it draws from: equal for equal arguments.
+
+    `within` is what a merged run's checkpoint has in place of a base.
 
     Raises:
         AgentError, CommandError: environment, settings and base do not fit together.
     """
     generator = torch.Generator(env.device).manual_seed(config.seed)
-    weights = None if base is None or config.choices["method"] == SCRATCH else base.policy(SETTING, env.character)
+    weights = within
+    if base is not None and config.choices["method"] != SCRATCH:
+        weights = base.policy(SETTING, env.character)
     return AdaptNet(env, env.demonstrations, config.agent, generator, weights, ranks=ranks), generator
 
 
@@ -52,11 +63,34 @@ def load_agent(config: AdaptNetTrainConfig, base: BaseRun | None, env: HumanoidV
     Raises:
         AgentError: the checkpoint is damaged, or made for another environment or base.
     """
-    agent, _ = make_agent(config, base, env)
     saved = checkpoint.load(folder / runs.LAST)
     checkpoint.check_compatible(saved["meta"], agent_meta(config, env))
+    within = Base.within(saved["agent"]) if runs.MERGED in config.choices else None
+    agent, _ = make_agent(config, base, env, within=within)
     agent.load_state_dict(saved["agent"])
     return agent
+
+
+def load_blended(
+    config: AdaptNetTrainConfig,
+    base: BaseRun | None,
+    env: HumanoidVectorEnv,
+    folder: Path,
+    blend: Blend,
+    moved: str | None = None,
+) -> AdaptNet:
+    """The same, with its adapters as was told; `moved` is where the base of the other run has moved to.
+
+    Raises:
+        AgentError: as `load_agent`.
+        CommandError: what was told cannot be.
+    """
+
+    def load_other(theirs: Path) -> AdaptNet:
+        other, other_base = open_run(theirs, moved)
+        return load_agent(other, other_base, env, theirs)
+
+    return blend.of(load_agent(config, base, env, folder), AGENT, load_other)
 
 
 def agent_meta(config: AdaptNetTrainConfig, env: HumanoidVectorEnv) -> dict[str, Any]:

@@ -10,7 +10,8 @@ from typing import Any, Literal
 
 from murmillo.agents.common import checkpoint
 from murmillo.agents.common.interface import Steerable
-from murmillo.cli.agents import AGENTS, load_player, load_untrained, make_agent
+from murmillo.cli.agents import AGENTS, load_untrained, make_agent
+from murmillo.cli.blending import NOTHING, Blend, load_blended
 from murmillo.cli.config import TrainConfig
 from murmillo.cli.devices import for_playing
 from murmillo.cli.errors import CommandError
@@ -50,6 +51,7 @@ class Request:
         worlds: episodes that the policy is measured in at its ages (`measure_ages`); 0 leaves that out.
         motions: other clips than the run's own, or the place to which those have moved.
         along: the checkpoints that the run kept on its way, too.
+        blend: how the adapters of the run's policy act.
     """
 
     metrics: tuple[str, ...]
@@ -59,6 +61,7 @@ class Request:
     worlds: int = 0
     motions: str | None = None
     along: bool = False
+    blend: Blend = NOTHING
 
 
 @dataclasses.dataclass(frozen=True)
@@ -114,6 +117,7 @@ class Bench:
             "seed": request.seed,
             "start": request.start,
             "not_comparable": not_comparable(self.folder, request.motions, self.config.env.motions, self.clips),
+            **request.blend.identity(),
         }
 
     def measure(self, path: Path, chunks: Path, sources: tuple[str, ...] = tuple(SOURCES)) -> Measured:
@@ -128,9 +132,12 @@ class Bench:
         """
         identity, request = self.identity(path), self.request
         made_of = (self.config.choices["agent"], self.config.agent, self.env, self.config.seed)
-        make = {TRAINED: lambda: load_player(*made_of, path), UNTRAINED: lambda: load_untrained(*made_of, path)}
+        make = {
+            TRAINED: lambda: load_blended(self.config, self.env, path, request.blend),
+            UNTRAINED: lambda: load_untrained(*made_of, path),
+        }
         agents = {source: make[source]() for source in sources if source in make}
-        key = {name: identity[name] for name in ("checkpoint", "seed", "start")}
+        key = {name: identity[name] for name in ("checkpoint", "seed", "start", "blend") if name in identity}
         store = ChunkStore(chunks, self.env.num_envs, {"format": _FORMAT, "clips": self.clips, **key})
         commander = Commander(self.env.library, self.labelled, self.encodes)
         recorders: dict[str, Recorder] = {

@@ -21,7 +21,7 @@ _CHUNKS = f"{runs.EVALUATION}/chunks"
 
 
 def evaluate(config: TrainConfig, folder: Path, request: Request) -> dict[str, Any]:
-    """Measure the run in `folder` and write the figures, plots and reports into it.
+    """Measure the run in `folder` and write the figures, plots and reports into it; those of a blend have their place.
 
     What was recorded stays in the folder: the same request later goes on from there.
 
@@ -29,11 +29,15 @@ def evaluate(config: TrainConfig, folder: Path, request: Request) -> dict[str, A
         What `evaluation/metrics.json` has.
 
     Raises:
-        CommandError: a metric that there is not or that this run's agent cannot give, or the run kept no checkpoints.
+        CommandError: a metric that there is not or that this run's agent cannot give, the run kept no checkpoints, or
+            its adapters cannot act as is asked.
         AgentError: there is no checkpoint, or it does not fit.
         SuiteError: the clips cannot be used.
     """
     begun = time.monotonic()
+    if request.along and request.blend:
+        raise CommandError(f"checkpoint=all: {request.blend} is measured of the last one alone; drop one of the two")
+    into = request.blend.place(folder)
     kept = kept_checkpoints(folder) if request.along else {}
     if request.along and not kept:
         raise CommandError(
@@ -45,21 +49,21 @@ def evaluate(config: TrainConfig, folder: Path, request: Request) -> dict[str, A
         for samples, path in kept.items():
             if samples != last:
                 _put_into_history(bench, samples, path)
-        measured = bench.measure(folder / runs.LAST, folder / _CHUNKS)
+        measured = bench.measure(folder / runs.LAST, into / _CHUNKS)
         results = {
             **measured.identity,
             "clips": _clips(bench),
             "hidden": list(config.agent.ppo.hidden),
             "left_out": bench.left_out,
-            **({} if config.base is None else {"base": config.base}),
+            **({} if config.base is None or runs.MERGED in config.choices else {"base": config.base}),
             "seconds": round(time.monotonic() - begun, 1),
             "metrics": measured.metrics,
         }
     if request.worlds:
         motions = results["clips"]["motions"]
         moved = dataclasses.replace(config, env=dataclasses.replace(config.env, motions=motions))
-        results["ages"] = measure_ages(moved, folder, request.worlds, request.seed)
-    return _keep(folder, measured, results)
+        results["ages"] = measure_ages(moved, folder, request.worlds, request.seed, request.blend)
+    return _keep(into, measured, results)
 
 
 def _put_into_history(bench: Bench, samples: int, path: Path) -> None:

@@ -94,9 +94,19 @@ def _what(results: dict[str, Any]) -> str:
         lines.append(
             f"It adapts `{results['base']}`: the *{SOURCES[UNTRAINED]}* policy is that one, put into this world."
         )
+    if "blend" in results:
+        lines.append(_blend(**results["blend"]))
     if results["not_comparable"]:
         lines.append(f"**Not comparable**: {results['not_comparable']}.")
     return "\n\n".join(lines)
+
+
+def _blend(alpha: float | None, **other: Any) -> str:
+    """How much of which adapters acted."""
+    if other["with"] is None:
+        return f"Of its adapter {alpha:g} acts: 0 would be the base, 1 the adaptation."
+    alpha = 0.5 if alpha is None else alpha
+    return f"Of its adapter {alpha:g} acts, and {1 - alpha:g} of that of `{other['with']}`."
 
 
 def _figures(results: dict[str, Any]) -> str:

@@ -6,6 +6,7 @@ from typing import Any
 
 from murmillo.agents.common import checkpoint
 from murmillo.cli import runs
+from murmillo.cli.blending import NOTHING, Blend
 from murmillo.cli.evaluation.identity import checkpoint_digest
 from murmillo.cli.tasks import low, table
 from murmillo.cli.tasks.config import TaskTrainConfig
@@ -42,7 +43,14 @@ def evaluate(
 
 
 def keep(
-    folder: Path, saved: Mapping[str, Any], task: str, agent: str, worlds: int, seed: int, metrics: dict[str, Any]
+    folder: Path,
+    saved: Mapping[str, Any],
+    task: str,
+    agent: str,
+    worlds: int,
+    seed: int,
+    metrics: dict[str, Any],
+    blend: Blend = NOTHING,
 ) -> dict[str, Any]:
     """Write `evaluation/metrics.json`, and return what it has.
 
@@ -53,6 +61,7 @@ def keep(
         worlds: episodes that were measured.
         seed: of them.
         metrics: what was found, by metric.
+        blend: how its adapters acted; where anything was told, the figures have a place of their own.
     """
     results = {
         "run": folder.name,
@@ -64,10 +73,12 @@ def keep(
         "seed": seed,
         "start": "as in training",
         "not_comparable": None,
+        **blend.identity(),
         "metrics": metrics,
     }
-    (folder / runs.EVALUATION).mkdir(exist_ok=True)
-    runs.write_json(folder / runs.METRICS, results)
+    to = blend.place(folder) / runs.METRICS
+    to.parent.mkdir(parents=True, exist_ok=True)
+    runs.write_json(to, results)
     return results
 
 

@@ -25,6 +25,15 @@ class Terms:
         return f"licences: {'; '.join(self.licences)}. The clips, and weights trained on them, {verdict}."
 
 
+def together(*terms: Terms) -> Terms:
+    """What several of them come to."""
+    return Terms(
+        licences=tuple(sorted({licence for each in terms for licence in each.licences})),
+        sources=tuple(sorted({source for each in terms for source in each.sources})),
+        redistributable=all(each.redistributable for each in terms),
+    )
+
+
 def terms_of(clips: Sequence[Clip]) -> Terms:
     """What the licences of the clips come to."""
     return Terms(

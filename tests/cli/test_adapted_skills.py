@@ -11,12 +11,15 @@ from pathlib import Path
 import pytest
 import torch
 
+from murmillo.agents.common import checkpoint
 from murmillo.agents.common.adapter import AdaptedPolicy
-from murmillo.cli import bases, gl, play, runs
+from murmillo.cli import bases, gl, merging, play, runs
 from murmillo.cli import config as configuration
 from murmillo.cli.agents import load_player, load_untrained, make_agent
 from murmillo.cli.bases import TARGETS, compose_adaptation
+from murmillo.cli.blending import Blend, load_blended
 from murmillo.cli.checks import check_settings
+from murmillo.cli.errors import CommandError
 from murmillo.cli.main import main
 from murmillo.envs import HumanoidVectorEnv
 from tests.cli.refusals import assert_refused
@@ -205,18 +208,135 @@ def test_a_task_over_an_adaptation_is_in_its_world(murmillo: Murmillo, own: Path
 
 
 def test_play_and_film(own: Path) -> None:
-    session = play._open_agent(own / "hills", play.PlayConfig(str(own / "hills")))
+    session = play._open_agent(own / "hills", play.AgentPlayConfig(str(own / "hills"), alpha=0.25))
     try:
         assert session.env.config.terrain.kind == "mixed"
+        assert session.adapted is not None
+        assert (session.adapted.adapters, session.adapted.alpha) == (1, 0.25)
+        session.blend(0.5)
+        assert session.adapted.alpha == 0.5
         session.step()
     finally:
         session.env.close()
     if all(gl.why_not(backend) for backend in gl.candidates()):
         pytest.skip("no OpenGL draws on this machine")
-    words = ("record", "run=runs/hills", "seconds=0.1", "skill=run_forward")
+    words = ("record", "run=runs/hills", "seconds=0.1", "skill=run_forward", "alpha=0.5")
     done = subprocess.run([sys.executable, "-m", "murmillo.cli.main", *words], capture_output=True, check=False)
     assert done.returncode == 0, done.stderr
     assert (own / "hills" / "video.mp4").is_file()
+
+
+# --- blended and merged -----------------------------------------------------------------------------------------------
+
+
+def actions(runs_of: list[tuple[Path, Blend]]) -> list[torch.Tensor]:
+    """Likeliest actions of such runs under one latent and all labels, in the world of the first."""
+    first = configuration.load(runs_of[0][0])
+    env = HumanoidVectorEnv(6, first.env)
+    try:
+        obs = {name: torch.as_tensor(value) for name, value in env.reset(seed=3)[0].items()}
+        obs["skill"] = torch.arange(6) % 3
+        latent, found = torch.nn.functional.normalize(torch.ones(first.agent.latent_dim), dim=0), []
+        for run, blend in runs_of:
+            agent = load_blended(configuration.load(run), env, run / runs.LAST, blend)
+            agent.follow(latent)
+            found.append(agent.act(obs, deterministic=True).action)
+        return found
+    finally:
+        env.close()
+
+
+def test_alpha_goes_from_the_base_to_the_last_bit(adapted: Path) -> None:
+    ice, base = adapted / "ice", adapted / "base"
+    told = [(ice, Blend()), (ice, Blend(1.0)), (ice, Blend(0.0)), (base, Blend()), (ice, Blend(0.3, str(ice)))]
+    asis, whole, none, own, twice = actions(told)
+    assert torch.equal(none, own)
+    assert torch.equal(whole, asis)
+    assert (whole - own).abs().max() > 1e-4
+    torch.testing.assert_close(twice, asis, atol=1e-5, rtol=0.0)
+
+
+def test_a_blend_is_measured_apart(murmillo: Murmillo, own: Path) -> None:
+    asked = ("worlds=2", "trajectories=1", "metrics=quality")
+    status, out, err = murmillo("evaluate", "run=runs/hills", *asked, "alpha=0.5")
+    assert status == 0, err
+    place = own / "hills" / "blends" / "alpha=0.5"
+    assert f"{place.relative_to(own.parent)}/evaluation.md" in out
+    assert "Of its adapter 0.5 acts" in (place / "evaluation.md").read_text()
+    results = json.loads((place / "evaluation" / "metrics.json").read_text())
+    assert results["blend"] == {"alpha": 0.5, "with": None, "with_checkpoint": None}
+    assert not (own / "hills" / "evaluation").exists()
+
+
+def test_a_merged_run_is_a_run_like_any_other(murmillo: Murmillo, own: Path, adapted: Path) -> None:
+    status, out, err = murmillo("merge", "run=runs/hills", "into=runs/one", "worlds=2")
+    assert status == 0, err
+    assert "runs/one: runs/hills as one network" in out
+    assert sorted(path.name for path in own.iterdir()) == ["base", "hills", "ice", "one"]
+    for name in ("scalars.csv", "versions.json", "skills.json", "clips.json", "terms.json"):
+        assert (own / "one" / name).read_bytes() == (own / "hills" / name).read_bytes(), name
+    assert "which learns no more" in (own / "one" / "report.md").read_text()
+    assert "run.resume" not in (own / "one" / "report.md").read_text()
+    meta, was = (checkpoint.load(own / name / runs.LAST)["meta"] for name in ("one", "hills"))
+    merged = meta.pop("merged")
+    assert (merged["run"], merged["base"]) == ("runs/hills", str(adapted / "base"))
+    assert {**meta, "base": was["base"], "base_digest": merged["base_digest"]} == was
+    shutil.rmtree(own / "base")
+    theirs, ours = actions([(own / "hills", Blend()), (own / "one", Blend())])
+    torch.testing.assert_close(ours, theirs, atol=1e-5, rtol=0.0)
+    status, _, err = murmillo("evaluate", "run=runs/one", "worlds=2", "trajectories=1", "metrics=quality")
+    assert status == 0, err
+    assert "It adapts" not in (own / "one" / "evaluation.md").read_text()
+    assert murmillo("compare", "runs/hills", "runs/one", "out=beside")[0] == 0
+    assert murmillo("train", "task=location", "low=runs/one", *TINY_TASK, "run.name=high")[0] == 0
+    for words, part in (
+        (
+            ("train", "run.resume=runs/one", "runner.samples=999"),
+            "run.resume=runs/one: this run was merged of runs/hil",
+        ),
+        (("train", "base=runs/one", "to=friction"), "base=runs/one: this run adapts a policy itself"),
+        (("merge", "run=runs/one", "into=runs/two"), "run=runs/one: this run is merged already, of runs/hills"),
+        (("evaluate", "run=runs/one", "alpha=0.5"), "alpha=0.5: a policy without adapters cannot be blended"),
+    ):
+        assert_refused(murmillo(*words), part)
+
+
+@pytest.mark.parametrize(
+    ("words", "parts"),
+    [
+        (("run=runs/ice",), ("into", "needed")),
+        (("run=runs/gone", "into=runs/new"), ("run=runs/gone", "no such run")),
+        (("run=runs/base", "into=runs/new"), ("run=runs/base", "adapts no other")),
+        (("run=runs/ice", "into=runs/base"), ("into=runs/base", "already")),
+        (("run=runs/ice", "into=gone/new"), ("into=gone/new", "no folder gone")),
+        (("run=runs/ice", "into=runs/.new"), ("into=runs/.new", "letters")),
+        (("run=runs/ice", "into=runs/new", "alpha=1.2"), ("alpha=1.2", "between")),
+        (("run=runs/ice", "into=runs/new", "worlds=-1"), ("worlds=-1", "0 for none")),
+        (("run=runs/ice", "into=runs/new", "base=runs/base"), ("base=runs/base", "drop this")),
+        (("run=runs/ice", "into=runs/new", "with=runs/base"), ("with=runs/base", "cannot be joined")),
+        (("run=runs/ice", "into=runs/new", "with=runs/hills"), ("with=runs/hills", "heights")),
+    ],
+)
+def test_what_cannot_be_merged(murmillo: Murmillo, own: Path, words: tuple[str, ...], parts: tuple[str, ...]) -> None:
+    before = sorted(own.iterdir())
+    assert_refused(murmillo("merge", *words), *parts)
+    assert sorted(own.iterdir()) == before
+
+
+def test_nothing_is_left_of_a_merging_that_failed(own: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    adaptation, before = merging.open_adaptation(str(own / "ice")), sorted(own.iterdir())
+    monkeypatch.setattr(merging, "TOLERANCE", -1.0)
+    with pytest.raises(CommandError, match=r"merged, its actions would differ by .* it stays as it is"):
+        merging.save(adaptation, Blend(), own / "new")
+    assert sorted(own.iterdir()) == before
+
+
+def test_two_methods_do_not_go_together(murmillo: Murmillo, own: Path) -> None:
+    config = (own / "hills" / "config.yaml").read_text()
+    (own / "hills" / "config.yaml").write_text(config.replace("agent: case", "agent: ase"))
+    asked = ("run=runs/ice", "with=runs/hills", "alpha=0.5")
+    for command in ("record", "evaluate"):
+        assert_refused(murmillo(command, *asked), "with=runs/hills", "a run of ase, the other one of case")
 
 
 # --- mistakes --------------------------------------------------------------------------------------------------------

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable
 from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
 import pytest
 import torch
@@ -14,15 +15,14 @@ from imageio_ffmpeg import count_frames_and_secs
 
 from murmillo.agents.adaptnet.agent import AdaptNet
 from murmillo.agents.adaptnet.config import AdaptNetConfig
-from murmillo.agents.common.errors import AgentError
 from murmillo.cli import gl
 from murmillo.cli.adaptation.checks import check_settings
 from murmillo.cli.adaptation.config import TARGETS, AdaptNetTrainConfig, compose_adaptnet
 from murmillo.cli.adaptation.latents import latent
 from murmillo.cli.adaptation.measuring import piece_errors
 from murmillo.cli.adaptation.published import imitation_error
-from murmillo.cli.adaptation.record import AdaptNetRecordConfig, blended
-from murmillo.cli.adaptation.world import load_agent, make_agent, make_env, open_run
+from murmillo.cli.adaptation.world import load_agent, load_blended, make_agent, make_env, open_run
+from murmillo.cli.blending import Blend
 from murmillo.cli.errors import CommandError
 from murmillo.cli.main import main
 from murmillo.envs.character import load_character
@@ -185,7 +185,7 @@ def test_the_baselines_train_one_after_the_other(murmillo: Murmillo, own: Path) 
     assert set(methods) == {"scratch-body-smoke-1-0", "progressive-body-smoke-1-1"}
     for run in methods.values():
         assert "adapted to `body` by" in (run / "report.md").read_text()
-        with pytest.raises(AgentError, match="without adapters cannot be blended"):
+        with pytest.raises(CommandError, match=r"alpha=0\.5: a policy without adapters cannot be blended"):
             player(run, alpha=0.5)
 
 
@@ -226,12 +226,12 @@ def test_the_papers_figure_is_known_by_the_name_of_the_clip() -> None:
 # --- blending, films and maps ----------------------------------------------------------------------------------------
 
 
-def player(run: Path, **settings: object) -> tuple[AdaptNet, dict[str, torch.Tensor]]:
-    """The run's agent as `murmillo record` has it, and what it sees first."""
+def player(run: Path, **told: Any) -> tuple[AdaptNet, dict[str, torch.Tensor]]:
+    """The run's agent with its adapters as was told, and what it sees first."""
     config, base = open_run(run)
     env = make_env(config, 2)
     try:
-        agent = blended(config, base, env, run, AdaptNetRecordConfig(str(run), **settings))  # type: ignore[arg-type]
+        agent = load_blended(config, base, env, run, Blend(**told))
         return agent, {name: torch.as_tensor(value) for name, value in env.reset(seed=3)[0].items()}
     finally:
         env.close()
@@ -253,6 +253,34 @@ def test_alpha_goes_from_the_base_to_the_adaptation(trained: Path) -> None:
     assert (act(whole) - act(base)).abs().max() > 1e-4
     torch.testing.assert_close(act(both), act(other), atol=1e-6, rtol=0.0)
     assert latent(base, obs).shape == (2, 8 + 4)
+
+
+def test_a_merged_run_needs_no_base(murmillo: Murmillo, own: Path) -> None:
+    status, _, err = murmillo("merge", "run=runs/slippery", "into=runs/one", "base=runs/base", "alpha=0.5", "worlds=2")
+    assert status == 0, err
+    half, obs = player(own / "slippery", alpha=0.5)
+    shutil.rmtree(own / "base")
+    one, _ = player(own / "one")
+    assert one.adapters == 0
+    actions = [agent.act(obs, deterministic=True).action for agent in (half, one)]
+    torch.testing.assert_close(*actions, atol=1e-5, rtol=0.0)
+    assert "runs/slippery alpha=0.5" in (own / "one" / "report.md").read_text()
+    assert json.loads((own / "one" / "evaluation" / "metrics.json").read_text())["run"] == "one"
+    status, _, err = murmillo("evaluate", "run=runs/one", "worlds=2")
+    assert status == 0, err
+    assert_refused(murmillo("train", "run.resume=runs/one"), "run.resume=runs/one", "learns no more")
+    assert_refused(murmillo("map", "runs/one"), "runs/one", "merged of runs/slippery")
+
+
+def test_a_blend_is_measured_apart(murmillo: Murmillo, own: Path) -> None:
+    before = (own / "style" / "evaluation" / "metrics.json").read_bytes()
+    status, out, err = murmillo("evaluate", "run=runs/style", "with=runs/slippery", "worlds=2")
+    assert status == 0, err
+    place = "runs/style/blends/with=slippery"
+    assert f"{place}/evaluation.md" in out
+    found = json.loads((own.parent / place / "evaluation" / "metrics.json").read_text())["blend"]
+    assert (found["alpha"], found["with"], len(found["with_checkpoint"])) == (None, "runs/slippery", 64)
+    assert (own / "style" / "evaluation" / "metrics.json").read_bytes() == before
 
 
 def test_films(own: Path, folder: Path) -> None:

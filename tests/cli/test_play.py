@@ -67,7 +67,7 @@ def test_without_the_extra_pip_is_named(
 
 
 def test_a_run_of_an_agent_is_opened_with_its_clips_and_falls(trained: Path) -> None:
-    session = play._open_agent(trained, play.PlayConfig(str(trained), seed=3))
+    session = play._open_agent(trained, play.AgentPlayConfig(str(trained), seed=3))
     assert session.plays_freely
     assert session.latents is not None
     for _ in range(3):

@@ -139,6 +139,26 @@ def test_controls_are_those_that_the_session_has_room_for(
     assert keys <= KEYS.keys()
 
 
+def test_an_adaptation_has_a_slider_that_begins_where_it_is(
+    server: viser.ViserServer, play: Play, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    session, told, begun = play("ase"), [], {}
+    adapted: Any = SimpleNamespace(adapters=1, alpha=0.25, blend=told.append)
+    session.adapted = adapted
+    add_slider = server.gui.add_slider
+
+    def slider(name: str, low: float, high: float, step: float, value: float, **others: Any) -> Any:
+        begun[name] = (low, high, value)
+        return add_slider(name, low, high, step, value, **others)
+
+    monkeypatch.setattr(server.gui, "add_slider", slider)
+    Page(server, session, Loop(session, lambda frame: None), Scene(server, session.env.scene.render_model()), "tested")
+    assert begun["Alpha"] == (0.0, 1.0, 0.25)
+    session.blend(0.75)
+    assert told == [0.75]
+    assert play("ase").adapted is None
+
+
 def test_the_status_has_what_there_is() -> None:
     status = Status(2.0, "kick", 0.881, 1.25, 1, 0.5, {"position": 0.25})
     frame = Frame(np.zeros((17, 7)), (), status)
