@@ -174,9 +174,9 @@ class ASE(Blending):
     def follow(self, latent: Tensor) -> None:
         self.latents.hold(latent)
 
-    def random_condition(self, n: int) -> Tensor:
-        """Random latents `[n, Z]`, for a policy that is fitted to clips."""
-        return self.draw_latents(n)
+    def random_condition(self, label: Tensor) -> Tensor:
+        """Random latents `[n, Z]` whatever the labels `[n]`, for a policy that is fitted to clips."""
+        return self.draw_latents(len(label))
 
     def _observe_demonstrations(self) -> None:
         drawn = self.demonstrations(self.config.discriminator.minibatch, self.generator)

@@ -106,9 +106,9 @@ class CALM(Blending):
         """Encodings `[n, Z]` of random motions."""
         return self.encoder(self._draw_motions(n))
 
-    def random_condition(self, n: int) -> Tensor:
-        """Encodings of random motions `[n, Z]`, for a policy that is fitted to clips."""
-        return self.draw_latents(n)
+    def random_condition(self, label: Tensor) -> Tensor:
+        """Encodings of random motions `[n, Z]` whatever the labels `[n]`, for a policy that is fitted to clips."""
+        return self.draw_latents(len(label))
 
     def follow(self, latent: Tensor) -> None:
         self.motions.hold(latent)

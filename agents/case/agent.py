@@ -205,10 +205,9 @@ class CASE(Blending):
     def follow(self, latent: Tensor) -> None:
         self.latents.hold(latent)
 
-    def random_condition(self, n: int) -> Tensor:
-        """Random latents under random labels, `[n, Z + label_dim]`."""
-        label = torch.randint(len(self.focal.score), (n,), generator=self.generator)
-        return self.condition(self.draw_latents(n), label).detach()
+    def random_condition(self, label: Tensor) -> Tensor:
+        """Random latents under these labels `[n]`, `[n, Z + label_dim]`, for a policy that is fitted to clips."""
+        return self.condition(self.draw_latents(len(label)), label).detach()
 
     def skill_tables(self) -> dict[str, Tensor]:
         """Share of each skill in the practice, and the discriminator's mean score of it."""

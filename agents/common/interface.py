@@ -132,6 +132,9 @@ class Demonstrations(Protocol):
 
 
 class ImitationPairs(Protocol):
-    """Draws states of the reference motions and the actions that lead on: `{"state": [n, D], "action": [n, A]}`."""
+    """Draws states of the reference motions, their labels, and the actions that lead on.
+
+    `{"state": [n, D], "skill": [n], "action": [n, A]}`.
+    """
 
     def __call__(self, n: int, generator: torch.Generator) -> dict[str, Tensor]: ...

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import torch
+from torch import Tensor
 from torch.nn import functional as F
 
 from murmillo.agents.common.interface import ImitationPairs
@@ -13,7 +14,7 @@ from murmillo.agents.common.ppo import ActorCritic
 from murmillo.agents.common.training import adam
 
 _CONDITIONS = 16
-"""Minibatches of conditions, drawn once: those of CALM are encodings of motions, and dear."""
+"""Minibatches of labels, whose conditions are drawn once: those of CALM are encodings of motions, and dear."""
 
 
 @dataclass
@@ -41,18 +42,20 @@ def warm_start(
     pairs: ImitationPairs,
     config: WarmStartConfig,
     generator: torch.Generator,
-    condition: Callable[[int], Told] = lambda n: None,
+    condition: Callable[[Tensor], Told] = lambda skill: None,
 ) -> list[float]:
-    """Minimise E ||mu(s, c) - a||^2 / A over (s, a) of the clips and random conditions; the critic stays as it is.
+    """Minimise E ||mu(s, c) - a||^2 / A over (s, a) of the clips and conditions c of their labels; the critic stays.
 
-    The state normaliser learns from these states too, since the policy should meet its inputs at their final scale.
+    Under labels of other clips the policy would learn to be deaf to them. The state normaliser learns from these states
+    too, since the policy should meet its inputs at their final scale.
 
     Args:
         model: whose policy is fitted.
         pairs: draws states and the actions that lead on along the clip.
         config: how long and how fast.
         generator: draws pairs.
-        condition: draws what the policy is told of n states at random: conditions `[n, C]`, or named tensors.
+        condition: draws what the policy is told in states of clips with these labels `[n]`: conditions `[n, C]`, or
+            named tensors.
 
     Returns:
         the loss of every step.
@@ -61,11 +64,17 @@ def warm_start(
     action = data["action"].float()
     model.state_normalizer.update(data["state"])
     state = model.state_normalizer(data["state"])
-    conditions = [condition(config.minibatch) for _ in range(_CONDITIONS)]
+    skill = data["skill"]
+    of_skill, count = torch.argsort(skill, stable=True), torch.bincount(skill)
+    first = count.cumsum(0) - count
+    labels = skill[torch.randint(config.pairs, (_CONDITIONS, config.minibatch), generator=generator)]
+    conditions = [condition(some) for some in labels]
     optimizer = adam((model.policy.parameters(), config.learning_rate))
     losses: list[float] = []
     for step in range(config.steps):
-        rows = torch.randint(config.pairs, (config.minibatch,), generator=generator)
+        wanted = labels[step % _CONDITIONS]
+        place = torch.rand(config.minibatch, generator=generator) * count[wanted]
+        rows = of_skill[first[wanted] + place.long()]
         mean = model.policy.mode(model.policy(state[rows], conditions[step % _CONDITIONS]))
         loss = F.mse_loss(mean, action[rows])
         optimizer.zero_grad()

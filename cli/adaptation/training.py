@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import torch
+from torch import Tensor
 
 from murmillo.agents.adaptnet.agent import AdaptNet
 from murmillo.agents.adaptnet.networks import LENGTH
@@ -112,8 +113,9 @@ def _warm_start(
     obs = tensors(env.reset(seed=config.seed)[0])
     obs[LENGTH] = obs[LENGTH].new_full((env.num_envs,), agent.observed.frames or 1)  # pairs are moments within a clip
 
-    def told(n: int) -> Obs:
-        return {name: obs[name][torch.randint(env.num_envs, (n,), generator=generator)] for name in agent.observed.told}
+    def told(label: Tensor) -> Obs:
+        rows = [torch.randint(env.num_envs, (len(label),), generator=generator) for _ in agent.observed.told]
+        return {name: obs[name][some] for name, some in zip(agent.observed.told, rows, strict=True)}
 
     progress.say(f"warm start: {config.warm_start.steps} steps on the clips' own next poses")
     losses = warm_start(agent.model, env.demonstrations.imitation_pairs, config.warm_start, generator, told)

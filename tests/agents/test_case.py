@@ -14,6 +14,7 @@ from murmillo.agents.case.networks import LabelEmbedding
 from murmillo.agents.common.errors import AgentError
 from murmillo.agents.common.rollout import tensors
 from murmillo.agents.common.runner import Runner
+from murmillo.agents.common.warm_start import WarmStartConfig, warm_start
 from tests.agents.toy import PointMass, make_case, make_runner, small_case
 
 SKILLS = 3
@@ -194,3 +195,18 @@ def test_a_checkpoint_of_fewer_labels_is_refused(generator: torch.Generator) -> 
     state = make_case(PointMass(3, skills=2), generator).state_dict()
     with pytest.raises(AgentError, match="label embedding differs"):
         make_case(PointMass(3, skills=3), generator).load_state_dict(state)
+
+
+def test_a_warm_start_hears_the_labels(generator: torch.Generator) -> None:
+    """The same states have other actions under another label, and one label is ten times as frequent as the other."""
+    env = PointMass(4, skills=2)
+    agent = make_case(env, generator)
+
+    def pairs(n: int, generator: torch.Generator) -> dict[str, Tensor]:
+        skill = (torch.arange(n) % 11 == 0).long()
+        action = torch.tensor([[0.6, -0.4], [-0.5, 0.7]])[skill]
+        return {"state": torch.randn(n, 4, generator=generator), "skill": skill, "action": action}
+
+    config = WarmStartConfig(steps=200, pairs=2000, minibatch=64, learning_rate=1e-2)
+    curve = warm_start(agent.model, pairs, config, generator, agent.random_condition)
+    assert max(curve[-10:]) < 0.01  # deaf to the labels it could not get below a tenth

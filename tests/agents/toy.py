@@ -134,8 +134,9 @@ class PointMass(VectorEnv):
         return drawn if rows is None else {name: value[rows] for name, value in drawn.items()}
 
     def imitation_pairs(self, n: int, generator: torch.Generator) -> dict[str, Tensor]:
-        state = self.demonstrations(n, generator)["window"][:, -1]
-        return {"state": state, "action": state[:, 2:]}
+        drawn = self.demonstrations(n, generator)
+        state = drawn["window"][:, -1]
+        return {"state": state, "skill": drawn["skill"], "action": state[:, 2:]}
 
     def state_dict(self) -> dict[str, Tensor]:
         return {
