@@ -106,7 +106,7 @@ def existing(path: str, key: str) -> Path:
             f"{key}={path}: this folder is no run, it has no {CONFIG}; name one that `murmillo train` made"
         )
     parent = folder.parent
-    others = [other.parent.name for other in parent.glob(f"*/{CONFIG}")]
+    others = [other.parent.name for other in parent.glob(f"*/{SCALARS}")]  # other folders have a config.yaml too
     known = near_names(folder.name, others) if others else f"there are no runs in {parent}"
     raise CommandError(f"{key}={path}: there is no such run; {known}")
 
