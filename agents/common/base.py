@@ -29,6 +29,8 @@ MERGED = "merged"
 _POLICY, _NORMALIZER = "policy.", "state_normalizer."
 _WITHIN = (f"{_POLICY}base.", f"{_NORMALIZER}normalizers.0.")
 """Where an adapted policy has the two."""
+_PLAIN = f"{_POLICY}plain."
+"""Where a merged one has the policy of the base's kind."""
 _PER_ACTION = ("head.weight", "head.bias", "spread.weight", "spread.bias", "log_std")
 """The tensors with a row for each action."""
 
@@ -82,8 +84,10 @@ class Base:
         found = cls.beneath(_model(agent) or {})
         if "mean" not in found.normalizer:
             return None
-        merged = Shape.load(agent[MERGED]) if MERGED in agent else None
-        return replace(found, parts={**agent, "discriminator": agent.get(EYE)}, merged=merged)
+        found = replace(found, parts={**agent, "discriminator": agent.get(EYE)})
+        if MERGED not in agent:
+            return found
+        return replace(found, policy=_under(_PLAIN, _model(agent) or {}), merged=Shape.load(agent[MERGED]))
 
     @classmethod
     def beneath(cls, model: Mapping[str, Tensor]) -> "Base":
