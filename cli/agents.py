@@ -25,7 +25,7 @@ class AgentKind(NamedTuple):
 
     Attributes:
         config: its configuration.
-        make: from environment, demonstrations, configuration and generator; the agent's `random_condition(label)`
+        make: from environment, demonstrations, configuration and generator; the agent's `draw_condition(label)`
             draws what its policy is told of states with labels `[n]`, for the warm start.
         labelled: it is told the skill, so that a checkpoint belongs to one list of skills.
     """

@@ -209,7 +209,7 @@ def _warm_start(config: TrainConfig, runner: Runner, generator: torch.Generator,
     env: Any = runner.env
     progress.say(f"warm start: {config.warm_start.steps} steps on the clips' own next poses")
     losses = warm_start(
-        agent.model, env.demonstrations.imitation_pairs, config.warm_start, generator, agent.random_condition
+        agent.model, env.demonstrations.imitation_pairs, config.warm_start, generator, agent.draw_condition
     )
     progress.say(f"warm start: squared error of the action from {losses[0]:.4f} to {losses[-1]:.4f}")
     runner.ranks.copy_first(agent.model)  # all did the same, but not all processors round alike

@@ -174,7 +174,7 @@ class ASE(Blending):
     def follow(self, latent: Tensor) -> None:
         self.latents.hold(latent)
 
-    def random_condition(self, label: Tensor) -> Tensor:
+    def draw_condition(self, label: Tensor) -> Tensor:
         """Random latents `[n, Z]` whatever the labels `[n]`, for a policy that is fitted to clips."""
         return self.draw_latents(len(label))
 

@@ -106,7 +106,7 @@ class CALM(Blending):
         """Encodings `[n, Z]` of random motions."""
         return self.encoder(self._draw_motions(n))
 
-    def random_condition(self, label: Tensor) -> Tensor:
+    def draw_condition(self, label: Tensor) -> Tensor:
         """Encodings of random motions `[n, Z]` whatever the labels `[n]`, for a policy that is fitted to clips."""
         return self.draw_latents(len(label))
 

@@ -205,7 +205,7 @@ class CASE(Blending):
     def follow(self, latent: Tensor) -> None:
         self.latents.hold(latent)
 
-    def random_condition(self, label: Tensor) -> Tensor:
+    def draw_condition(self, label: Tensor) -> Tensor:
         """Random latents under these labels `[n]`, `[n, Z + label_dim]`, for a policy that is fitted to clips."""
         return self.condition(self.draw_latents(len(label)), label).detach()
 

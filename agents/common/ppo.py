@@ -190,6 +190,7 @@ class PPO:
             (std, config.std_learning_rate),
         )
         self._log_std = std
+        """The policy's own, `[A]` each; none where it depends on the state."""
         self._pace = 1.0
         """Of the policy: its learning rate as a multiple of the config's."""
         self._iterations = 0
@@ -253,6 +254,7 @@ class PPO:
 
     @torch.no_grad()
     def _keep_noise(self) -> None:
+        """Hold a learned standard deviation at its least."""
         if self.config.std_least:
             for log_std in self._log_std:
                 log_std.clamp_(min=math.log(self.config.std_least))

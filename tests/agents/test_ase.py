@@ -122,7 +122,7 @@ def test_warm_start_imitates(generator: torch.Generator) -> None:
     agent = make_ase(env, generator)
     config = WarmStartConfig(steps=150, minibatch=64)
     critic = [parameter.clone() for parameter in agent.model.critic.parameters()]
-    curve = warm_start(agent.model, env.imitation_pairs, config, generator, agent.random_condition)
+    curve = warm_start(agent.model, env.imitation_pairs, config, generator, agent.draw_condition)
     assert len(curve) == 150
     assert curve[-1] < 0.05 * curve[0]
     assert all(torch.equal(a, b) for a, b in zip(critic, agent.model.critic.parameters(), strict=True))

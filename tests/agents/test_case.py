@@ -208,5 +208,5 @@ def test_a_warm_start_hears_the_labels(generator: torch.Generator) -> None:
         return {"state": torch.randn(n, 4, generator=generator), "skill": skill, "action": action}
 
     config = WarmStartConfig(steps=200, pairs=2000, minibatch=64, learning_rate=1e-2)
-    curve = warm_start(agent.model, pairs, config, generator, agent.random_condition)
+    curve = warm_start(agent.model, pairs, config, generator, agent.draw_condition)
     assert max(curve[-10:]) < 0.01  # deaf to the labels it could not get below a tenth
