@@ -202,11 +202,15 @@ def test_a_warm_start_hears_the_labels(generator: torch.Generator) -> None:
     env = PointMass(4, skills=2)
     agent = make_case(env, generator)
 
+    actions = torch.tensor([[0.6, -0.4], [-0.5, 0.7]])
+
     def pairs(n: int, generator: torch.Generator) -> dict[str, Tensor]:
         skill = (torch.arange(n) % 11 == 0).long()
-        action = torch.tensor([[0.6, -0.4], [-0.5, 0.7]])[skill]
-        return {"state": torch.randn(n, 4, generator=generator), "skill": skill, "action": action}
+        return {"state": torch.randn(n, 4, generator=generator), "skill": skill, "action": actions[skill]}
 
     config = WarmStartConfig(steps=200, pairs=2000, minibatch=64, learning_rate=1e-2)
     curve = warm_start(agent.model, pairs, config, generator, agent.draw_condition)
     assert max(curve[-10:]) < 0.01  # deaf to the labels it could not get below a tenth
+    label = torch.arange(40) % 2
+    done, _ = agent.model.act(torch.randn(40, 4, generator=generator), agent.draw_condition(label))
+    torch.testing.assert_close(done, actions[label], atol=0.2, rtol=0)
