@@ -43,6 +43,13 @@ def check_settings(config: TrainConfig) -> None:
             f"runner.reward_weights.residual={config.runner.reward_weights['residual']}: there are no residual forces "
             "to be sparing with; set env.residual_force (50 N are the published code's), or drop this weight"
         )
+    followed = config.runner.reward_weights.get("tracking", 0.0)
+    if bool(followed) != config.env.tracking.on:
+        needed = "set env.tracking.on=true" if followed else "give it a weight: +runner.reward_weights.tracking=2"
+        raise CommandError(
+            f"runner.reward_weights.tracking={followed:g} and env.tracking.on={str(config.env.tracking.on).lower()} "
+            f"do not go together: a clip is followed for its reward; {needed}"
+        )
 
 
 def _check_nothing_adapts(agent: AdaptationConfig) -> None:

@@ -5,6 +5,7 @@ import dataclasses
 import torch
 
 from murmillo.envs import EnvConfig
+from murmillo.envs.tracking import TrackingConfig
 
 CPU = torch.device("cpu")
 
@@ -15,5 +16,11 @@ def for_training(env: EnvConfig) -> EnvConfig:
 
 
 def for_playing(env: EnvConfig) -> EnvConfig:
-    """Those of all commands but training: MuJoCo on the CPU, so that any machine plays what another has trained."""
-    return dataclasses.replace(env, physics="cpu", device="auto", tensors=False, contacts=0, constraints=0)
+    """Those of all commands but training: MuJoCo on the CPU, so that any machine plays what another has trained.
+
+    Nobody has a clip to follow there, nor loses it.
+    """
+    followed = TrackingConfig()
+    return dataclasses.replace(
+        env, physics="cpu", device="auto", tensors=False, contacts=0, constraints=0, tracking=followed
+    )

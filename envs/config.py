@@ -14,6 +14,7 @@ from murmillo.envs.starts import StartConfig
 from murmillo.envs.tasks.arguments import check_range
 from murmillo.envs.tasks.pushes import PushConfig
 from murmillo.envs.terrain import TerrainConfig
+from murmillo.envs.tracking import TrackingConfig
 
 
 @dataclass
@@ -45,6 +46,7 @@ class EnvConfig:
         pushes: pushes at random, whatever the task.
         fall: what ends an episode.
         starts: how one begins.
+        tracking: a clip to follow, moment by moment.
     """
 
     motions: str = "builtin"
@@ -71,6 +73,7 @@ class EnvConfig:
     pushes: PushConfig = field(default_factory=PushConfig)
     fall: FallConfig = field(default_factory=FallConfig)
     starts: StartConfig = field(default_factory=StartConfig)
+    tracking: TrackingConfig = field(default_factory=TrackingConfig)
 
 
 def check_config(config: EnvConfig, render_mode: str | None, modes: list[str]) -> None:
@@ -87,6 +90,9 @@ def check_config(config: EnvConfig, render_mode: str | None, modes: list[str]) -
             raise SuiteError(f"{name}={getattr(config, name)}: needs at least {least}")
     if config.friction is not None:
         check_range("friction", config.friction, least=0.0, of="")
+    config.tracking.check()
+    if config.tracking.on and config.features != "character":
+        raise SuiteError(f"tracking.on=true: needs features=character, not {config.features}")
     for name, value, known in (
         ("autoreset", config.autoreset, [mode.name.lower() for mode in AutoresetMode]),
         ("physics", config.physics, list(ENGINES)),

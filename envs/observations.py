@@ -3,6 +3,8 @@
 from collections.abc import Collection
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import accumulate
+from typing import NamedTuple
 
 import torch
 from torch import Tensor
@@ -13,8 +15,7 @@ from murmillo.envs.rotations import heading_quat, quat_conj, quat_mul, quat_rota
 
 def state_dim(character: Character) -> int:
     """Width of `character_state`: 120 for the sword-and-shield humanoid."""
-    rotations = sum(6 if joint.kind == "ball" else 1 for joint in character.joints)
-    return 13 + rotations + character.action_dim + 3 * len(character.key_bodies)
+    return state_parts(character).keys.stop
 
 
 def character_state(character: Character, qpos: Tensor, qvel: Tensor, key_pos_w: Tensor) -> Tensor:
@@ -60,6 +61,25 @@ def character_state(character: Character, qpos: Tensor, qvel: Tensor, key_pos_w:
     return torch.cat(parts, dim=-1).float()
 
 
+class StateParts(NamedTuple):
+    """Where the parts of `character_state` lie: the rows of its table."""
+
+    height: slice
+    rotation: slice
+    linear: slice
+    angular: slice
+    joints: slice
+    joint_velocities: slice
+    keys: slice
+
+
+def state_parts(character: Character) -> StateParts:
+    """The columns of each part of `character_state`."""
+    rotations = sum(6 if joint.kind == "ball" else 1 for joint in character.joints)
+    ends = list(accumulate((1, 6, 3, 3, rotations, character.action_dim, 3 * len(character.key_bodies))))
+    return StateParts(*map(slice, [0, *ends[:-1]], ends))
+
+
 def feature_mask(character: Character, masked: Collection[str]) -> Tensor:
     """Columns of `character_state` that tell of these key bodies.
 
@@ -72,9 +92,9 @@ def feature_mask(character: Character, masked: Collection[str]) -> Tensor:
     Returns:
         [D] bool.
     """
-    layout, idle = _layout(character, torch.get_default_device()), idle_bodies(character, masked)
+    parts, idle = state_parts(character), idle_bodies(character, masked)
     mask = torch.zeros(state_dim(character), dtype=torch.bool)
-    rotation, velocity = 13, 13 + layout.width
+    rotation, velocity = parts.joints.start, parts.joint_velocities.start
     for joint in character.joints:
         rotation_end = rotation + (6 if joint.kind == "ball" else 1)
         velocity_end = velocity + joint.dof.stop - joint.dof.start

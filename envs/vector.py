@@ -30,6 +30,7 @@ from murmillo.envs.starts import FALLEN, KINDS, RECOVERY, REFERENCE, StartSample
 from murmillo.envs.tasks import Imitation, Task
 from murmillo.envs.tasks.goals import uniform
 from murmillo.envs.terrain import make_terrain
+from murmillo.envs.tracking import Tracker
 
 RENDERED_WORLDS = 16
 
@@ -128,6 +129,9 @@ class HumanoidVectorEnv(VectorEnv):
         self._steps = torch.zeros(num_envs, dtype=torch.int64)
         self._free_steps = torch.zeros(num_envs, dtype=torch.int64)
         self._skills = CommandedSkills(self.library.skills, num_envs)
+        self._tracker = None
+        if config.tracking.on:
+            self._tracker = Tracker(self.character, self.library, self._skills, config.tracking, num_envs)
         self._ended = torch.zeros(num_envs, dtype=torch.bool)
         self._fell = torch.zeros(num_envs, dtype=torch.bool)
 
@@ -177,23 +181,20 @@ class HumanoidVectorEnv(VectorEnv):
     def step(self, actions: np.ndarray | Tensor) -> tuple[dict[str, Any], Any, Any, Any, dict[str, Any]]:
         """Advance all worlds by 1/30 s. See the class for what comes back."""
         resetting = self._ended & (self._mode is AutoresetMode.NEXT_STEP)
-        residual = self._advance(torch.as_tensor(actions, device=self.home))
+        info = self._advance(torch.as_tensor(actions, device=self.home))
         terms = {name: term.masked_fill(resetting, 0.0) for name, term in self.task.reward(self.state).items()}
         healed = self.physics.healed()
         fall = self._fallen(self.state, self._observer.ground) & (self._steps > 1) & (self._free_steps == 0)
-        terminated = (fall | self.task.terminated(self.state) | healed) & ~resetting
+        lost = self._track(info, resetting)
+        terminated = (fall | lost | self.task.terminated(self.state) | healed) & ~resetting
         over = self._steps >= self.config.episode_steps
         if self.terrain is not None:
             over |= ~self.terrain.contains(self.state.qpos)
         truncated = over & ~terminated & ~resetting
         self._pass_time()
         self._ended, self._fell = terminated | truncated, torch.where(resetting, self._fell, fall)
-        info: dict[str, Any] = {
-            "reward_terms": terms,
-            "fall": fall & terminated,
-            "healed": healed,
-            **residual,
-        }
+        self._starts.note(self._ended.nonzero().squeeze(-1), terminated[self._ended])
+        info |= {"reward_terms": terms, "fall": fall & terminated, "healed": healed}
         if self._mode is AutoresetMode.SAME_STEP:
             info["final_obs"], info["_final_obs"] = self._observation(), self._ended
             self._restart(self._ended)
@@ -269,6 +270,8 @@ class HumanoidVectorEnv(VectorEnv):
         """All that the next step depends on, but for what others set: skill weights and `set_ground_contact`."""
         parts = {"physics": self.physics.state_dict(), "starts": self._starts.state_dict()}
         parts |= {"task": self.task.state_dict(), "forces": self._forces.state_dict()}
+        if self._tracker is not None:
+            parts["tracking"] = self._tracker.state_dict()
         own = {name: getattr(self, f"_{name}").clone() for name in _OWN_STATE}
         seen = {"history": self._observer.frames.clone(), "skill": self._skills.current.clone()}
         return {**parts, "generator": self._generator.get_state(), **seen, **own}
@@ -282,6 +285,8 @@ class HumanoidVectorEnv(VectorEnv):
         self._starts.load_state_dict(state["starts"])
         self.task.load_state_dict(state["task"])
         self._forces.load_state_dict(state["forces"])
+        if self._tracker is not None:
+            self._tracker.load_state_dict(state["tracking"])
         self._generator.set_state(generator)
         self._observer.load(self.state, state["history"])
         self._skills.current = state["skill"].clone()
@@ -322,12 +327,20 @@ class HumanoidVectorEnv(VectorEnv):
         self._observer.see(self.state)
         return self._forces.report(self.state)
 
+    def _track(self, info: dict[str, Any], resetting: Tensor) -> Tensor:
+        """Who has lost its clip [N] bool; the reward for following it goes into the side rewards of info."""
+        if self._tracker is None:
+            return torch.zeros_like(resetting)
+        reward, lost = self._tracker.step(self._observer.frames[:, -1], self._generator)
+        info.setdefault("side_rewards", {})["tracking"] = reward.masked_fill(resetting, 0.0)
+        return lost & (self._steps > 1) & (self._free_steps == 0)
+
     def _restart(self, mask: Tensor, kind: int | None = None) -> None:
         """New episodes in the worlds of mask [N] bool."""
         ids = mask.nonzero().squeeze(-1)
         if not len(ids):
             return
-        starts = self._starts.draw(self._fell[ids], self._generator, kind)
+        starts = self._starts.draw(ids, self._fell[ids], self._generator, kind)
         moved = starts.kind != RECOVERY
         if self.terrain is not None:
             starts = self._starts.moved(starts, self.terrain.settle(self.character, starts.qpos, ids, self._generator))
@@ -340,7 +353,11 @@ class HumanoidVectorEnv(VectorEnv):
         self._free_steps[ids] = torch.where(free, self.config.starts.free_steps, 0)
         self._skills.draw(ids, self._generator)
         own = starts.commanded
-        self._skills.put(ids[starts.kind == REFERENCE][own], starts.skill[own])
+        owners = ids[starts.kind == REFERENCE][own]
+        self._skills.put(owners, starts.skill[own])
+        if self._tracker is not None:
+            self._tracker.turn(ids, self._generator)
+            self._tracker.begin(owners, starts.clip[own], starts.time[own])
         self._ended = self._ended & ~mask
         self.task.reset(ids, self.state, self._generator)
         self._forces.reset(ids, self._generator)

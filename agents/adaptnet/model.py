@@ -64,12 +64,10 @@ def make_model(
     Raises:
         AgentError: the base does not fit the environment or the config.
     """
-    hidden, std = config.ppo.hidden, config.ppo.std
+    sizes = (config.ppo.hidden, config.ppo.std, generator, config.ppo.std_least)
     maps = HEIGHTS in observed.told
     if base is None:
-        policy = RecurrentPolicy(
-            _encoder(observed, config, generator, maps), observed.action_dim, hidden, std, generator
-        )
+        policy = RecurrentPolicy(_encoder(observed, config, generator, maps), observed.action_dim, *sizes)
         normalizer = RunningNormalizer((observed.state_dim,))
         return HistoryActorCritic(observed, policy, normalizer, objectives, config, generator)
 
@@ -79,7 +77,7 @@ def make_model(
             "the base acts by a map of heights, the environment shows none; give it uneven ground, or name another base"
         )
     encoder = _encoder(observed, config, generator, seen_maps)
-    plain = RecurrentPolicy(encoder, observed.action_dim, hidden, std, generator)
+    plain = RecurrentPolicy(encoder, observed.action_dim, *sizes)
     if config.method == "adaptnet":
         control = HeightMapEncoder(generator) if maps and not seen_maps else None
         size = HeightMapEncoder.size if control is not None else 0
@@ -91,7 +89,7 @@ def make_model(
     if config.method == "finetune":
         return HistoryActorCritic(observed, own, views.normalizers[1], objectives, config, generator)
     encoder = _encoder(observed, config, generator, maps)
-    policy = ProgressivePolicy(own, encoder, hidden, std, generator)
+    policy = ProgressivePolicy(own, encoder, *sizes)
     return HistoryActorCritic(observed, policy, views, objectives, config, generator)
 
 

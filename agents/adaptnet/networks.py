@@ -1,6 +1,7 @@
 """Policy and critic on the last states, a goal and, where there is one, a map of the ground (AdaptNet, Figure 3)."""
 
 import copy
+import math
 from collections.abc import Sequence
 
 import torch
@@ -59,6 +60,7 @@ class RecurrentPolicy(GaussianPolicy):
         hidden: Sequence[int],
         std: float,
         generator: torch.Generator,
+        std_least: float = 0.0,
     ) -> None:
         """
         Args:
@@ -67,9 +69,11 @@ class RecurrentPolicy(GaussianPolicy):
             hidden: sizes of the hidden layers.
             std: where the standard deviation begins; exp(-3) in the released code.
             generator: draws the initial weights.
+            std_least: what it does not shrink below.
         """
         super().__init__(encoder.size, action_dim, hidden, std, generator, activation=nn.ReLU6)
         self.encoder = encoder
+        self._least = math.log(std_least) if std_least else -math.inf
         self.spread = linear(hidden[-1], action_dim, generator, bound=1e-4)
 
     def encode(self, state: Tensor, told: Told = None) -> Tensor:
@@ -84,7 +88,7 @@ class RecurrentPolicy(GaussianPolicy):
 
     def moments(self, parameters: Tensor) -> tuple[Tensor, Tensor]:
         mean, log_std = parameters.chunk(2, -1)
-        return mean, log_std
+        return mean, log_std.clamp_min(self._least)
 
 
 class ProgressivePolicy(RecurrentPolicy):
@@ -100,15 +104,16 @@ class ProgressivePolicy(RecurrentPolicy):
         hidden: Sequence[int],
         std: float,
         generator: torch.Generator,
+        std_least: float = 0.0,
     ) -> None:
         """
         Args:
             base: is frozen here, for good; has as many hidden layers.
             encoder: of the new policy.
-            hidden, std, generator: as `RecurrentPolicy` has them.
+            hidden, std, generator, std_least: as `RecurrentPolicy` has them.
         """
         actions = base.head.out_features
-        super().__init__(encoder, actions, hidden, std, generator)
+        super().__init__(encoder, actions, hidden, std, generator, std_least)
         self.base = base.requires_grad_(False)
         layers = [layer for layer in base.trunk if isinstance(layer, nn.Linear)]
         inputs = [layer.in_features for layer in layers]

@@ -49,6 +49,8 @@ class PPOConfig:
         noise_correlation: between the noise of one action and the next; the papers' noise is white.
         mean_init_scale: factor on the initial weights of the policy's last layer.
         policy_learning_rate: Adam's step for the policy.
+        policy_momentum: of its gradients from minibatch to minibatch, Adam's first beta; 0.9 are the gradients of half
+            an iteration here, 0.97 those of two.
         value_learning_rate: Adam's step for the critic.
         epochs: passes over the rollout.
         minibatch: samples a step.
@@ -72,6 +74,7 @@ class PPOConfig:
     noise_correlation: float = 0.0
     mean_init_scale: float = 1.0
     policy_learning_rate: float = 2e-5
+    policy_momentum: float = 0.9
     value_learning_rate: float = 2e-5
     epochs: int = 6
     minibatch: int = 16384
@@ -93,6 +96,8 @@ class PPOConfig:
             raise AgentError(f"agent.ppo.std_least={self.std_least}: needs at most std, {self.std}")
         if not 0 <= self.noise_correlation < 1:
             raise AgentError(f"agent.ppo.noise_correlation={self.noise_correlation}: needs at least 0 and less than 1")
+        if not 0 <= self.policy_momentum < 1:
+            raise AgentError(f"agent.ppo.policy_momentum={self.policy_momentum}: needs at least 0 and less than 1")
 
 
 class ActorCritic(nn.Module):
@@ -189,6 +194,8 @@ class PPO:
             (model.critic.parameters(), config.value_learning_rate),
             (std, config.std_learning_rate),
         )
+        group = self.optimizer.param_groups[0]
+        group["betas"] = (config.policy_momentum, group["betas"][1])
         self._log_std = std
         """The policy's own, `[A]` each; none where it depends on the state."""
         self._pace = 1.0

@@ -145,6 +145,31 @@ def test_a_least_noise_above_the_first_is_refused() -> None:
         PPOConfig(std_least=0.06)
 
 
+def test_with_momentum_the_policy_goes_on_where_it_was_going() -> None:
+    gone = []
+    for momentum in (0.0, 0.99):
+        generator, ppo = torch.Generator().manual_seed(1), make(policy_momentum=momentum, epochs=1)
+        critic = [p.detach().clone() for p in ppo.model.critic.parameters()]
+        for advantage in (1.0, 0.0):  # the second update has nothing to say
+            batch = rollout(ppo, generator)
+            batch["advantage"] = advantage * batch["action"].sum(-1)
+            before = [p.detach().clone() for p in ppo.model.policy.parameters()]
+            ppo.update(batch, generator)
+        moves = [(p - q).abs().max() for p, q in zip(ppo.model.policy.parameters(), before, strict=True)]
+        gone.append(max(moves).item())
+        assert any((p != q).any() for p, q in zip(ppo.model.critic.parameters(), critic, strict=True))
+        state = ppo.state_dict()
+        again = make(policy_momentum=momentum)
+        again.load_state_dict(state)
+        assert [group["betas"][0] for group in again.optimizer.param_groups] == [momentum, 0.9, 0.9]
+    assert gone[0] < 0.3 * gone[1]
+
+
+def test_a_momentum_that_never_ends_is_refused() -> None:
+    with pytest.raises(AgentError, match=r"agent\.ppo\.policy_momentum=1\.0: needs at least 0 and less than 1"):
+        PPOConfig(policy_momentum=1.0)
+
+
 def test_the_kl_that_is_asked_for_shrinks_with_the_iterations(generator: torch.Generator) -> None:
     ppo = make(epochs=2, lead_kl=0.06, kl_halving=20)
     kls = [ppo.update(rollout(ppo, generator), generator)["kl"] for _ in range(160)]

@@ -31,7 +31,7 @@ def test_a_reference_start_is_the_clips_pose_and_velocity_and_not_in_the_floor(
     sample, moments = deep.sample, []
     deep.sample = lambda *args: moments.append(sample(*args)) or moments[-1]  # type: ignore[method-assign]
     starts = StartSampler(character, deep, StartConfig(), 50, frames=4).draw(
-        torch.zeros(50, dtype=torch.bool), generator, REFERENCE
+        torch.arange(50), torch.zeros(50, dtype=torch.bool), generator, REFERENCE
     )
     [(clip, time)] = moments
     qpos, qvel = deep.pose(clip, time)
@@ -49,7 +49,7 @@ def test_starts_know_the_labels_of_their_clips(
     sample, moments = library.sample, []
     library.sample = lambda *args: moments.append(sample(*args)) or moments[-1]  # type: ignore[method-assign]
     starts = StartSampler(character, library, StartConfig(reference=0.5, fallen=0.0, commanded=0.25), 400, 1).draw(
-        torch.zeros(400, dtype=torch.bool), generator
+        torch.arange(400), torch.zeros(400, dtype=torch.bool), generator
     )
     begun = int((starts.kind == REFERENCE).sum())
     assert torch.equal(starts.skill, library.clip_skill[moments[0][0]][:begun])
@@ -59,13 +59,14 @@ def test_starts_know_the_labels_of_their_clips(
 def test_only_who_fell_goes_on_from_there(
     character: Character, library: MotionLibrary, generator: torch.Generator
 ) -> None:
-    sampler = StartSampler(character, library, StartConfig(recovery=1.0, fallen=0.0, reference=0.0), 1, frames=1)
-    fell = torch.arange(20) % 2 == 0
-    starts = sampler.draw(fell, generator)
+    sampler = StartSampler(character, library, StartConfig(recovery=1.0, fallen=0.0, reference=0.0), 20, frames=1)
+    worlds = torch.arange(20)
+    fell = worlds % 2 == 0
+    starts = sampler.draw(worlds, fell, generator)
     assert torch.equal(starts.kind, torch.where(fell, RECOVERY, DEFAULT))
     assert (starts.qpos[~fell, 2] == 0.89).all()
     sampler.on_ground = False
-    assert (sampler.draw(fell, generator).kind == DEFAULT).all()
+    assert (sampler.draw(worlds, fell, generator).kind == DEFAULT).all()
 
 
 @pytest.mark.parametrize("shape", ["", "SuperLongLegs"])
@@ -84,7 +85,7 @@ def test_fallen_states_are_dropped_from_above_the_floor_whatever_the_legs(
     )
     body = load_body("sword_shield", BodyConfig(shape))
     sampler = StartSampler(body, library, StartConfig(drop_height=(0.9, 0.9)), 32, frames=1, threads=1)
-    sampler.draw(torch.zeros(32, dtype=torch.bool), generator, FALLEN)
+    sampler.draw(torch.arange(32), torch.zeros(32, dtype=torch.bool), generator, FALLEN)
     [qpos] = dropped
     above = qpos[:, 2] - body.default_qpos[2]
     assert above.tolist() == pytest.approx([0.9 - load_character().default_qpos[2].item()] * 32)

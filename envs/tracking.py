@@ -1,0 +1,142 @@
+"""How closely the character goes along the clips of the skills that it is commanded, moment by moment."""
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor
+
+from murmillo.envs.character import CONTROL_DT, Character
+from murmillo.envs.errors import SuiteError
+from murmillo.envs.motion import MotionLibrary
+from murmillo.envs.observations import StateParts, state_parts
+from murmillo.envs.skills import CommandedSkills
+
+_SEAM = 0.5
+"""[s] A clip does not begin again in its last half second."""
+_SETTLED = 0.3
+"""[s] after its beginning a clip can be lost."""
+
+
+@dataclass
+class TrackingConfig:
+    """A clip that each world follows, beside whatever else it is rewarded for.
+
+    Attributes:
+        on: whether worlds follow a clip of their commanded skill, by the side reward "tracking".
+        lost: an episode ends, as by a fall, where the key points are further than this from the clip's on average [m].
+        near: within this of a clip's first pose, by the same measure, the clip begins [m].
+        patience: time in which to come there from the middle of another skill [s]; then the clip begins all the same.
+        switch: probability that another skill is commanded where a clip ends; else it begins again.
+    """
+
+    on: bool = False
+    lost: float = 0.5
+    near: float = 0.15
+    patience: float = 1.0
+    switch: float = 0.5
+
+    def check(self) -> None:
+        """Raise SuiteError for what cannot be."""
+        for name in ("lost", "near", "patience"):
+            if not getattr(self, name) >= 0.0:
+                raise SuiteError(f"tracking.{name}={getattr(self, name)}: needs at least 0")
+        if not 0.0 <= self.switch <= 1.0:
+            raise SuiteError(f"tracking.switch={self.switch}: needs a probability between 0 and 1")
+
+
+class Tracker:
+    """Says of N worlds where in which clip they should be, and how far they are from that.
+
+    Who was started in a clip of its own skill goes on there. Whoever is commanded another skill turns to the beginning
+    of one of its clips: until the character is near that, or patience is over, the clip waits. A clip that has ended
+    goes on where it is most like its end, which of the built-in ones is their beginning, or gives way to another skill.
+
+    What is compared is `character_state`, so that neither place nor heading count, but the speeds do.
+    """
+
+    def __init__(
+        self,
+        character: Character,
+        library: MotionLibrary,
+        skills: CommandedSkills,
+        config: TrackingConfig,
+        num_envs: int,
+    ) -> None:
+        self._library, self._skills, self._config = library, skills, config
+        self._parts = state_parts(character.base)
+        self._clip = torch.zeros(num_envs, dtype=torch.int64)
+        self._time = torch.zeros(num_envs, dtype=torch.float64)
+        self._again = torch.stack([self._seam(clip) for clip in range(len(library.clips))])
+
+    def begin(self, env_ids: Tensor, clip: Tensor, time: Tensor) -> None:
+        """These worlds are at `time` [n] [s] of `clip` [n]."""
+        self._clip[env_ids], self._time[env_ids] = clip, time
+
+    def turn(self, env_ids: Tensor, generator: torch.Generator) -> None:
+        """These worlds [n] are to come to the beginning of a clip of their skill, wherever they are."""
+        clip, _ = self._library.sample(len(env_ids), generator, self._skills.current[env_ids])
+        self.begin(env_ids, clip, torch.full((len(env_ids),), -self._config.patience, dtype=torch.float64))
+
+    def step(self, state: Tensor, generator: torch.Generator) -> tuple[Tensor, Tensor]:
+        """One control step further; what the worlds do and are commanded next.
+
+        Args:
+            state: [N, 120] after the step.
+            generator: draws clips and skills.
+
+        Returns:
+            reward [N] in [0, 1], weighted exponentials of the errors as in DeepMimic (Peng et al. 2018, section 5);
+            lost [N] bool.
+        """
+        others = (self._library.clip_skill[self._clip] != self._skills.current).nonzero().squeeze(-1)
+        if len(others):
+            self.turn(others, generator)
+        self._time = self._time + CONTROL_DT
+        wanted = self._library.frames(self._clip, self._time.clamp_min(0.0), 1)[:, 0]
+        error = state - wanted
+        if self._library.mask is not None:
+            error = error.masked_fill(self._library.mask[self._clip], 0.0)
+        rotations, root, velocity, keys = _squares(error, self._parts)
+        reward = 0.4 * (-rotations).exp() + 0.2 * ((-root).exp() + (-velocity).exp() + (-keys).exp())
+        distance = error[:, self._parts.keys].unflatten(-1, (-1, 3)).norm(dim=-1).mean(-1)
+        lost = (distance > self._config.lost) & (self._time > _SETTLED)
+        self._time = torch.where((self._time < 0.0) & (distance < self._config.near), 0.0, self._time)
+        self._end(generator)
+        return reward, lost
+
+    def _end(self, generator: torch.Generator) -> None:
+        """Where clips are over they begin again, or other skills are commanded."""
+        over = (self._time >= self._library.duration[self._clip] - 0.5 * CONTROL_DT).nonzero().squeeze(-1)
+        if not len(over):
+            return
+        self._time[over] = self._again[self._clip[over]]
+        switched = over[torch.rand(len(over), generator=generator) < self._config.switch]
+        if len(switched):
+            self._skills.draw(switched, generator)
+            self.turn(switched, generator)
+
+    def _seam(self, clip: int) -> Tensor:
+        """The time [] [s] of the clip's moment that is most like its end, of those that are long enough before it."""
+        end = self._library.duration[clip]
+        before = torch.arange(max(1, int((end - _SEAM) / CONTROL_DT)), dtype=torch.float64) * CONTROL_DT
+        time = torch.cat((before, end.unsqueeze(0)))
+        states = self._library.frames(torch.full((len(time),), clip), time, 1)[:, 0]
+        error = states[:-1] - states[-1]
+        return before[torch.stack(_squares(error, self._parts)).sum(0).argmin()]
+
+    def state_dict(self) -> dict[str, Tensor]:
+        return {"clip": self._clip.clone(), "time": self._time.clone()}
+
+    def load_state_dict(self, state: dict[str, Tensor]) -> None:
+        self._clip, self._time = state["clip"].clone(), state["time"].clone()
+
+
+def _squares(error: Tensor, parts: StateParts) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+    """Weighted squares [n] of the errors [n, 120] in joints' rotations, root, root's velocities and key points."""
+
+    def square(columns: slice) -> Tensor:
+        return error[:, columns].square().sum(-1)
+
+    root = 200.0 * square(parts.height) + 5.0 * square(parts.rotation)
+    velocity = 2.0 * square(parts.linear) + 0.2 * square(parts.angular)
+    return square(parts.joints), root, velocity, 3.0 * square(parts.keys)

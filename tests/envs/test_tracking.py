@@ -1,0 +1,222 @@
+"""Following a clip of the commanded skill: where it should be, what it earns, and when it is lost."""
+
+import dataclasses
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+import torch
+
+from murmillo.envs import HumanoidVectorEnv, SuiteError
+from murmillo.envs.character import CONTROL_DT, Character, load_character
+from murmillo.envs.motion import MotionLibrary, load_clips
+from murmillo.envs.observations import character_state, state_parts
+from murmillo.envs.skills import CommandedSkills
+from murmillo.envs.tracking import Tracker, TrackingConfig
+
+CLIPS = ("guard", "kick", "taunt")
+GUARD, KICK, TAUNT = range(3)  # of clips and of skills alike
+UPRIGHT = {"reference": 1.0, "fallen": 0.0, "recovery": 0.0, "commanded": 1.0}
+
+
+@pytest.fixture(scope="module")
+def character() -> Character:
+    return load_character()
+
+
+@pytest.fixture(scope="module")
+def library(character: Character) -> MotionLibrary:
+    return MotionLibrary(load_clips("builtin", character, CLIPS), character)
+
+
+@pytest.fixture
+def generator() -> torch.Generator:
+    return torch.Generator().manual_seed(0)
+
+
+def make(num_envs: int, **kwargs: Any) -> HumanoidVectorEnv:
+    env = gymnasium.make_vec("murmillo/Imitation-v0", num_envs=num_envs, threads=1, clips=CLIPS, **kwargs)
+    assert isinstance(env, HumanoidVectorEnv)
+    return env
+
+
+def tracker(
+    character: Character, library: MotionLibrary, skill: list[int], **changes: Any
+) -> tuple[Tracker, CommandedSkills]:
+    """One world for each of the commanded skills."""
+    skills = CommandedSkills(library.skills, len(skill))
+    skills.put(torch.arange(len(skill)), torch.tensor(skill))
+    return Tracker(character, library, skills, TrackingConfig(on=True, **changes), len(skill)), skills
+
+
+def at(library: MotionLibrary, clip: int, time: float) -> torch.Tensor:
+    """The clip's state [1, 120] at this time."""
+    return library.frames(torch.tensor([clip]), torch.tensor([time], dtype=torch.float64), 1)[:, 0]
+
+
+def test_the_parts_of_the_state_are_where_they_are_said_to_be(character: Character):
+    parts = state_parts(character)
+    qpos, qvel = character.default_qpos.float(), torch.zeros(character.model.nv)
+    keys = character.key_positions(qpos)
+    rest = character_state(character, qpos, qvel, keys)
+    assert (parts.keys.stop, *rest.shape) == (120, 120)
+    changed = {
+        "height": (qpos + torch.eye(len(qpos))[2], qvel, keys + torch.eye(3)[2]),
+        "linear": (qpos, torch.eye(len(qvel))[1], keys),
+        "angular": (qpos, torch.eye(len(qvel))[4], keys),
+        "joint_velocities": (qpos, torch.eye(len(qvel))[6], keys),
+        "keys": (qpos, qvel, keys + 1.0),
+    }
+    for name, (q, v, k) in changed.items():
+        differs = (character_state(character, q, v, k) != rest).nonzero().flatten()
+        own = getattr(parts, name)
+        assert own.start <= differs.min() <= differs.max() < own.stop, name
+
+
+def test_who_does_what_the_clip_does_earns_everything(character, library, generator):
+    follower, _ = tracker(character, library, [KICK])
+    follower.begin(torch.tensor([0]), torch.tensor([KICK]), torch.tensor([0.5], dtype=torch.float64))
+    for step in range(1, 30):
+        reward, lost = follower.step(at(library, KICK, 0.5 + step * CONTROL_DT), generator)
+        assert reward.item() == pytest.approx(1.0, abs=1e-4)
+        assert not lost
+    late, _ = follower.step(at(library, KICK, 0.5 + 25 * CONTROL_DT), generator)
+    assert late.item() < 0.9
+
+
+@pytest.mark.parametrize("part", ["height", "rotation", "linear", "angular", "joints", "keys"])
+def test_every_part_of_the_state_counts_but_the_joints_velocities(character, library, generator, part: str):
+    rewards = []
+    for columns in (getattr(state_parts(character), part), state_parts(character).joint_velocities):
+        follower, _ = tracker(character, library, [GUARD])
+        follower.begin(torch.tensor([0]), torch.tensor([GUARD]), torch.zeros(1, dtype=torch.float64))
+        state = at(library, GUARD, CONTROL_DT).clone()
+        state[:, columns] += 1.0
+        rewards.append(follower.step(state, generator)[0].item())
+    assert rewards[0] < 0.95
+    assert rewards[1] == pytest.approx(1.0, abs=1e-4)
+
+
+def test_what_a_clip_says_nothing_of_is_left_out(character, generator):
+    clips = load_clips("builtin", character, ["guard"])
+    bare = MotionLibrary([dataclasses.replace(clip, masked=("sword",)) for clip in clips], character)
+    sword = state_parts(character).keys.start + 3 * character.key_bodies.index("sword")
+    rewards = []
+    for library in (MotionLibrary(clips, character), bare):
+        follower, _ = tracker(character, library, [0])
+        follower.begin(torch.tensor([0]), torch.tensor([0]), torch.zeros(1, dtype=torch.float64))
+        state = at(library, 0, CONTROL_DT).clone()
+        state[:, sword] += 1.0
+        rewards.append(follower.step(state, generator)[0].item())
+    assert rewards[0] < 0.9
+    assert rewards[1] == pytest.approx(1.0, abs=1e-4)
+
+
+def test_who_is_far_from_the_clip_has_lost_it(character, library, generator):
+    follower, _ = tracker(character, library, [GUARD], lost=0.2)
+    follower.begin(torch.tensor([0]), torch.tensor([GUARD]), torch.tensor([1.0], dtype=torch.float64))
+    parts, state = state_parts(character), at(library, GUARD, 1.0 + CONTROL_DT).clone()
+    state[:, parts.keys.start] += 6 * 0.19  # one key point of six
+    assert not follower.step(state, generator)[1]
+    state[:, parts.keys.start] += 6 * 0.03
+    assert follower.step(state, generator)[1]
+
+
+def test_a_skill_that_is_commanded_anew_waits_for_the_character_at_its_beginning(character, library, generator):
+    follower, skills = tracker(character, library, [GUARD], patience=0.5, near=0.15, lost=0.1)
+    follower.begin(torch.tensor([0]), torch.tensor([GUARD]), torch.tensor([1.0], dtype=torch.float64))
+    follower.step(at(library, GUARD, 1.0 + CONTROL_DT), generator)
+    skills.command("kick")
+    far = at(library, KICK, 0.0).clone()
+    far[:, state_parts(character).keys] += 0.3
+    for _ in range(5):
+        reward, lost = follower.step(far, generator)
+        assert not lost  # it may come from anywhere
+        assert reward < 0.9
+    follower.step(at(library, KICK, 0.0), generator)  # here it is: the clip begins
+    for step in range(1, 20):
+        assert follower.step(at(library, KICK, step * CONTROL_DT), generator)[0].item() == pytest.approx(1.0, abs=1e-4)
+
+
+def test_patience_ends(character, library, generator):
+    follower, _ = tracker(character, library, [KICK], patience=0.5, lost=0.1)
+    follower.turn(torch.tensor([0]), generator)
+    far = at(library, KICK, 0.0).clone()
+    far[:, state_parts(character).keys] += 0.3
+    lost = [bool(follower.step(far, generator)[1]) for _ in range(30)]
+    assert lost.index(True) == pytest.approx((0.5 + 0.3) / CONTROL_DT, abs=1)
+
+
+def test_at_its_end_a_clip_begins_again_or_gives_way_to_another(character, library, generator):
+    for switch, expected in ((0.0, {GUARD}), (1.0, {GUARD, KICK, TAUNT})):
+        follower, skills = tracker(character, library, [GUARD] * 60, switch=switch)
+        end = library.duration[GUARD] - 2 * CONTROL_DT
+        follower.begin(torch.arange(60), torch.full((60,), GUARD), end.repeat(60))
+        for step in (1, 2):
+            follower.step(at(library, GUARD, end.item() + step * CONTROL_DT).expand(60, -1), generator)
+        assert set(skills.current.tolist()) == expected
+        stayed = skills.current == GUARD
+        reward, _ = follower.step(at(library, GUARD, CONTROL_DT).expand(60, -1), generator)
+        assert reward[stayed].min() > 0.99  # the built-in clips end as they begin
+
+
+def test_the_environment_pays_for_following_and_ends_what_is_lost():
+    env = make(30, starts=UPRIGHT, tracking={"on": True, "lost": 0.5})
+    obs, _ = env.reset(seed=0)
+    assert set(obs["skill"]) == {GUARD, KICK, TAUNT}
+    held = np.zeros((30, 31), np.float32)
+    _, _, terminated, _, info = env.step(held)
+    assert 0.2 < info["side_rewards"]["tracking"].mean() <= 1.0
+    assert not terminated.any()
+    strict = make(30, starts=UPRIGHT, tracking={"on": True, "lost": 0.001})
+    strict.reset(seed=0)
+    for _ in range(15):
+        _, _, terminated, _, info = strict.step(held)
+    assert terminated.any()
+    assert not info["fall"].any()
+
+
+def test_nothing_is_followed_unless_asked_for():
+    env = make(2)
+    env.reset(seed=0)
+    assert "side_rewards" not in env.step(np.zeros((2, 31), np.float32))[4]
+
+
+def test_following_goes_on_from_a_saved_state_bit_for_bit(generator):
+    actions = torch.rand(80, 12, 31, generator=generator) * 0.2 - 0.1
+    starts = {**UPRIGHT, "commanded": 0.5, "adaptive": 0.5}
+    runs = []
+    for saved in (False, True):
+        env = make(12, starts=starts, tracking={"on": True}, episode_steps=40)
+        env.reset(seed=3)
+        for action in actions[:40]:
+            env.step(action.numpy())
+        if saved:
+            state = env.state_dict()
+            env = make(12, starts=starts, tracking={"on": True}, episode_steps=40)
+            env.reset(seed=9)
+            env.load_state_dict(state)
+        steps = [env.step(action.numpy()) for action in actions[40:]]
+        runs.append([(obs["skill"], info["side_rewards"]["tracking"], end) for obs, _, end, _, info in steps])
+    for plain, resumed in zip(*runs, strict=True):
+        for a, b in zip(plain, resumed, strict=True):
+            assert np.array_equal(a, b)
+
+
+@pytest.mark.parametrize(
+    ("tracking", "said"),
+    [
+        ({"lost": -1.0}, "tracking.lost=-1.0: needs at least 0"),
+        ({"patience": float("nan")}, "tracking.patience=nan"),
+        ({"switch": 1.5}, "tracking.switch=1.5: needs a probability"),
+    ],
+)
+def test_settings_that_cannot_be(tracking: dict[str, float], said: str):
+    with pytest.raises(SuiteError, match=said):
+        make(1, tracking=tracking)
+
+
+def test_links_are_not_followed():
+    with pytest.raises(SuiteError, match=r"tracking.on=true: needs features=character"):
+        make(1, features="links", tracking={"on": True})
