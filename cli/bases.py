@@ -83,7 +83,7 @@ def compose_adaptation(words: list[str]) -> TrainConfig:
     said = [word for word in words if word.partition("=")[0] not in ("agent", "to", "task")]
     # who names other motions means all of them, not those clips that are called like the former ones
     begun = ["clips=[]"] if value_of(words, "motions") is not None else []
-    begun.append("warm_start.steps=0")
+    begun += ["warm_start.steps=0", "guided_start.rounds=0"]
     if hasattr(base.config.agent, "upright_iterations"):
         begun.append("agent.upright_iterations=0")  # the base has come to the end of this curriculum
     with configuration.reading(base.folder) as (saved, choices):
@@ -144,10 +144,10 @@ def check(config: TrainConfig) -> None:
     if config.base is None:
         return
     base = find(config.base)
-    if config.warm_start.steps:
-        raise CommandError(
-            f"warm_start.steps={config.warm_start.steps}: an adaptation begins with what its base can do; drop this"
-        )
+    starts = {"warm_start.steps": config.warm_start.steps, "guided_start.rounds": config.guided_start.rounds}
+    for name, number in starts.items():
+        if number:
+            raise CommandError(f"{name}={number}: an adaptation begins with what its base can do; drop this")
     base.check_same(SETTING, "agent", config.agent, base.config.agent, _AGENT)
     base.check_same(SETTING, "env", config.env, base.config.env, _ENV)
 

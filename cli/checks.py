@@ -43,12 +43,20 @@ def check_settings(config: TrainConfig) -> None:
             f"runner.reward_weights.residual={config.runner.reward_weights['residual']}: there are no residual forces "
             "to be sparing with; set env.residual_force (50 N are the published code's), or drop this weight"
         )
-    followed = config.runner.reward_weights.get("tracking", 0.0)
-    if bool(followed) != config.env.tracking.on:
-        needed = "set env.tracking.on=true" if followed else "give it a weight: +runner.reward_weights.tracking=2"
+    _check_followed(config)
+
+
+def _check_followed(config: TrainConfig) -> None:
+    """Refuse clips that are followed for nothing, and what needs them where none is followed."""
+    weight = config.runner.reward_weights.get("tracking", 0.0)
+    uses = {"runner.reward_weights.tracking": weight, "guided_start.rounds": config.guided_start.rounds}
+    used = [f"{name}={value:g}" for name, value in uses.items() if value]
+    if used and not config.env.tracking.follow:
+        raise CommandError(f"{used[0]}: nobody follows a clip; set env.tracking.follow=true")
+    if config.env.tracking.follow and not used:
         raise CommandError(
-            f"runner.reward_weights.tracking={followed:g} and env.tracking.on={str(config.env.tracking.on).lower()} "
-            f"do not go together: a clip is followed for its reward; {needed}"
+            "env.tracking.follow=true: nothing uses the clips that are followed; give them a weight, "
+            "+runner.reward_weights.tracking=3, or a start, guided_start.rounds=8"
         )
 
 

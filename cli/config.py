@@ -14,6 +14,7 @@ from omegaconf import DictConfig, OmegaConf, open_dict
 from omegaconf.errors import OmegaConfBaseException
 from yaml import YAMLError
 
+from murmillo.agents.common.guided_start import GuidedStartConfig
 from murmillo.agents.common.runner import RunnerConfig
 from murmillo.agents.common.warm_start import WarmStartConfig
 from murmillo.cli import runs
@@ -77,6 +78,7 @@ class TrainConfig:
     env: EnvConfig = field(default_factory=EnvConfig)
     runner: RunnerConfig = field(default_factory=RunnerConfig)
     warm_start: WarmStartConfig = field(default_factory=WarmStartConfig)
+    guided_start: GuidedStartConfig = field(default_factory=GuidedStartConfig)
     run: RunConfig = field(default_factory=RunConfig)
     choices: dict[str, str] = field(default_factory=dict)
     base: str | None = None

@@ -14,6 +14,7 @@ from typing import Any
 import torch
 
 from murmillo.agents.common import checkpoint
+from murmillo.agents.common.guided_start import guided_start
 from murmillo.agents.common.interface import Labelled
 from murmillo.agents.common.logger import Logger
 from murmillo.agents.common.ranks import ALONE, Ranks
@@ -202,16 +203,25 @@ def _keep_skills(agent: Any, env: HumanoidVectorEnv, folder: Path) -> None:
 
 
 def _warm_start(config: TrainConfig, runner: Runner, generator: torch.Generator, progress: Progress) -> None:
-    """Regress the policy on the clips' next poses, and keep what comes of it for the report."""
-    if config.warm_start.steps == 0:
+    """Regress the policy on what leads along the clips, and keep what comes of it for the report."""
+    if not (config.warm_start.steps or config.guided_start.rounds):
         return
     agent: Any = runner.agent
     env: Any = runner.env
-    progress.say(f"warm start: {config.warm_start.steps} steps on the clips' own next poses")
-    losses = warm_start(
-        agent.model, env.demonstrations.imitation_pairs, config.warm_start, generator, agent.draw_condition
-    )
-    progress.say(f"warm start: squared error of the action from {losses[0]:.4f} to {losses[-1]:.4f}")
+    if config.warm_start.steps:
+        progress.say(f"warm start: {config.warm_start.steps} steps on the clips' own next poses")
+        losses = warm_start(
+            agent.model, env.demonstrations.imitation_pairs, config.warm_start, generator, agent.draw_condition
+        )
+        progress.say(f"warm start: squared error of the action from {losses[0]:.4f} to {losses[-1]:.4f}")
+    if rounds := config.guided_start.rounds:
+        each = env.num_envs * config.guided_start.steps
+        progress.say(f"guided start: {rounds} rounds of {each:,} control steps along the clips")
+        made = guided_start(agent.model, env, config.guided_start, generator, agent.draw_condition)
+        for number, round_ in enumerate(made, start=1):
+            who = "policy" if number > 1 else "guide"
+            came = f"the {who} goes on for {round_.length:.0f} steps, squared error {round_.loss:.5f}"
+            progress.say(f"guided start: round {number}, {came}")
     runner.ranks.copy_first(agent.model)  # all did the same, but not all processors round alike
     state = {"meta": runner.meta, "agent": agent.state_dict()}
     if runner.ranks.first:

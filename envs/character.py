@@ -86,6 +86,11 @@ class Character:
         """Number of actuated degrees of freedom A."""
         return self.model.nu
 
+    @cached_property
+    def lag(self) -> float:
+        """[s] by which a joint follows a target that moves steadily: damping over stiffness, the joints' median."""
+        return float(np.median(-self.model.actuator_biasprm[:, 2] / self.model.actuator_gainprm[:, 0]))
+
     def body_ids(self, names: tuple[str, ...]) -> list[int]:
         """Positions of these bodies in `bodies`."""
         return [self.bodies.index(name) for name in names]

@@ -91,8 +91,8 @@ def check_config(config: EnvConfig, render_mode: str | None, modes: list[str]) -
     if config.friction is not None:
         check_range("friction", config.friction, least=0.0, of="")
     config.tracking.check()
-    if config.tracking.on and config.features != "character":
-        raise SuiteError(f"tracking.on=true: needs features=character, not {config.features}")
+    if config.tracking.follow and config.features != "character":
+        raise SuiteError(f"tracking.follow=true: needs features=character, not {config.features}")
     for name, value, known in (
         ("autoreset", config.autoreset, [mode.name.lower() for mode in AutoresetMode]),
         ("physics", config.physics, list(ENGINES)),

@@ -13,8 +13,12 @@ from murmillo.envs.skills import CommandedSkills
 
 _SEAM = 0.5
 """[s] A clip does not begin again in its last half second."""
-_SETTLED = 0.3
+_SETTLED = 0.25
 """[s] after its beginning a clip can be lost."""
+_LOOP = 1.0
+"""Weighted squares by which a clip's beginning may differ from its end for it to begin there again."""
+_REST = 0.2
+"""Weighted squares by which a pose may differ from a clip's first or last and still be taken for rest."""
 
 
 @dataclass
@@ -22,14 +26,14 @@ class TrackingConfig:
     """A clip that each world follows, beside whatever else it is rewarded for.
 
     Attributes:
-        on: whether worlds follow a clip of their commanded skill, by the side reward "tracking".
+        follow: whether worlds follow a clip of their commanded skill, by the side reward "tracking".
         lost: an episode ends, as by a fall, where the key points are further than this from the clip's on average [m].
         near: within this of a clip's first pose, by the same measure, the clip begins [m].
         patience: time in which to come there from the middle of another skill [s]; then the clip begins all the same.
         switch: probability that another skill is commanded where a clip ends; else it begins again.
     """
 
-    on: bool = False
+    follow: bool = False
     lost: float = 0.5
     near: float = 0.15
     patience: float = 1.0
@@ -50,6 +54,7 @@ class Tracker:
     Who was started in a clip of its own skill goes on there. Whoever is commanded another skill turns to the beginning
     of one of its clips: until the character is near that, or patience is over, the clip waits. A clip that has ended
     goes on where it is most like its end, which of the built-in ones is their beginning, or gives way to another skill.
+    Rest at a clip's beginning and end is passed over: who sees only its state cannot tell the one from the other.
 
     What is compared is `character_state`, so that neither place nor heading count, but the speeds do.
     """
@@ -66,16 +71,19 @@ class Tracker:
         self._parts = state_parts(character.base)
         self._clip = torch.zeros(num_envs, dtype=torch.int64)
         self._time = torch.zeros(num_envs, dtype=torch.float64)
-        self._again = torch.stack([self._seam(clip) for clip in range(len(library.clips))])
+        self._character = character
+        spans = [self._span(clip) for clip in range(len(library.clips))]
+        self._first, self._last, self._again = torch.tensor(spans, dtype=torch.float64).unbind(-1)
 
     def begin(self, env_ids: Tensor, clip: Tensor, time: Tensor) -> None:
-        """These worlds are at `time` [n] [s] of `clip` [n]."""
-        self._clip[env_ids], self._time[env_ids] = clip, time
+        """These worlds are at `time` [n] [s] of `clip` [n], or at the next moment of it that is no rest."""
+        latest = self._last[clip] - CONTROL_DT
+        self._clip[env_ids], self._time[env_ids] = clip, torch.minimum(torch.maximum(time, self._first[clip]), latest)
 
     def turn(self, env_ids: Tensor, generator: torch.Generator) -> None:
         """These worlds [n] are to come to the beginning of a clip of their skill, wherever they are."""
-        clip, _ = self._library.sample(len(env_ids), generator, self._skills.current[env_ids])
-        self.begin(env_ids, clip, torch.full((len(env_ids),), -self._config.patience, dtype=torch.float64))
+        self._clip[env_ids], _ = self._library.sample(len(env_ids), generator, self._skills.current[env_ids])
+        self._time[env_ids] = -self._config.patience
 
     def step(self, state: Tensor, generator: torch.Generator) -> tuple[Tensor, Tensor]:
         """One control step further; what the worlds do and are commanded next.
@@ -99,14 +107,26 @@ class Tracker:
         rotations, root, velocity, keys = _squares(error, self._parts)
         reward = 0.4 * (-rotations).exp() + 0.2 * ((-root).exp() + (-velocity).exp() + (-keys).exp())
         distance = error[:, self._parts.keys].unflatten(-1, (-1, 3)).norm(dim=-1).mean(-1)
-        lost = (distance > self._config.lost) & (self._time > _SETTLED)
-        self._time = torch.where((self._time < 0.0) & (distance < self._config.near), 0.0, self._time)
+        first = self._first[self._clip]
+        lost = (distance > self._config.lost) & (self._time > first + _SETTLED)
+        there = (self._time < first) & ((distance < self._config.near) | (self._time >= 0.0))
+        self._time = torch.where(there, first, self._time)
         self._end(generator)
         return reward, lost
 
+    def guide(self) -> Tensor:
+        """The actions [N, A] that lead along the clips, in whatever states the worlds are.
+
+        Their targets are the clips' poses as much later as the PD control lags behind (`Character.lag`).
+        """
+        clip, time = self._clip, self._time.clamp_min(0.0) + self._character.lag
+        ahead = torch.where(time > self._last[clip], self._again[clip] + time - self._last[clip], time)
+        qpos, qvel = self._library.pose(clip, torch.maximum(ahead, self._first[clip]))
+        return self._character.action_for(self._character.from_base(qpos, qvel)[0])
+
     def _end(self, generator: torch.Generator) -> None:
         """Where clips are over they begin again, or other skills are commanded."""
-        over = (self._time >= self._library.duration[self._clip] - 0.5 * CONTROL_DT).nonzero().squeeze(-1)
+        over = (self._time >= self._last[self._clip] - 0.5 * CONTROL_DT).nonzero().squeeze(-1)
         if not len(over):
             return
         self._time[over] = self._again[self._clip[over]]
@@ -115,14 +135,22 @@ class Tracker:
             self._skills.draw(switched, generator)
             self.turn(switched, generator)
 
-    def _seam(self, clip: int) -> Tensor:
-        """The time [] [s] of the clip's moment that is most like its end, of those that are long enough before it."""
-        end = self._library.duration[clip]
-        before = torch.arange(max(1, int((end - _SEAM) / CONTROL_DT)), dtype=torch.float64) * CONTROL_DT
-        time = torch.cat((before, end.unsqueeze(0)))
+    def _span(self, clip: int) -> tuple[float, float, float]:
+        """Of a clip: when rest ends and when it begins again [s], and the moment before that is most like this end."""
+        end = self._library.duration[clip].item()
+        time = torch.arange(int(end / CONTROL_DT + 1e-6) + 1, dtype=torch.float64) * CONTROL_DT
         states = self._library.frames(torch.full((len(time),), clip), time, 1)[:, 0]
-        error = states[:-1] - states[-1]
-        return before[torch.stack(_squares(error, self._parts)).sum(0).argmin()]
+        first, last = 0.0, end
+        left, arrives = (self._apart(states, other) > _REST for other in (states[:1], states[-1:]))
+        if left.any() and arrives.any() and time[arrives][-1] - time[left][0] > _SEAM:
+            first, last = time[left][0].item(), time[arrives][-1].item()
+        before = (time >= first - 1e-6) & (time <= max(first, last - _SEAM) + 1e-6)
+        jump = self._apart(states[before], states[time <= last + 1e-6][-1:])
+        return first, last, first if jump[0] < _LOOP else time[before][jump.argmin()].item()
+
+    def _apart(self, states: Tensor, other: Tensor) -> Tensor:
+        """[n] how far states [n, 120] are from another [1, 120]."""
+        return torch.stack(_squares(states - other, self._parts)).sum(0)
 
     def state_dict(self) -> dict[str, Tensor]:
         return {"clip": self._clip.clone(), "time": self._time.clone()}
@@ -137,6 +165,6 @@ def _squares(error: Tensor, parts: StateParts) -> tuple[Tensor, Tensor, Tensor, 
     def square(columns: slice) -> Tensor:
         return error[:, columns].square().sum(-1)
 
-    root = 200.0 * square(parts.height) + 5.0 * square(parts.rotation)
-    velocity = 2.0 * square(parts.linear) + 0.2 * square(parts.angular)
-    return square(parts.joints), root, velocity, 3.0 * square(parts.keys)
+    root = 600.0 * square(parts.height) + 15.0 * square(parts.rotation)
+    velocity = 6.0 * square(parts.linear) + 0.6 * square(parts.angular)
+    return 3.0 * square(parts.joints), root, velocity, 9.0 * square(parts.keys)

@@ -130,7 +130,7 @@ class HumanoidVectorEnv(VectorEnv):
         self._free_steps = torch.zeros(num_envs, dtype=torch.int64)
         self._skills = CommandedSkills(self.library.skills, num_envs)
         self._tracker = None
-        if config.tracking.on:
+        if config.tracking.follow:
             self._tracker = Tracker(self.character, self.library, self._skills, config.tracking, num_envs)
         self._ended = torch.zeros(num_envs, dtype=torch.bool)
         self._fell = torch.zeros(num_envs, dtype=torch.bool)
@@ -262,6 +262,19 @@ class HumanoidVectorEnv(VectorEnv):
     def observation(self) -> dict[str, Any]:
         """The current observation, which a `set_skill` since the last step has changed."""
         return self._shown(self._observation())
+
+    @at_home
+    def guide(self) -> Any:
+        """The action [N, A] that leads each character along its clip, in whatever state it is.
+
+        Raises:
+            SuiteError: nothing is followed.
+        """
+        if self._tracker is None:
+            raise SuiteError("tracking.follow=false: there is no clip to be guided along; set tracking.follow=true")
+        action = torch.zeros(self.num_envs, self._action_dim, dtype=self.state.qpos.dtype)
+        action[:, : self.character.action_dim] = self._tracker.guide()
+        return self._shown(action.float())
 
     # --- checkpoints -------------------------------------------------------------------------------------------------
 

@@ -13,6 +13,7 @@ from murmillo.agents.case.config import CASEConfig
 from murmillo.agents.common.discriminator import DiscriminatorConfig
 from murmillo.agents.common.errors import AgentError
 from murmillo.agents.common.failures import WatchConfig
+from murmillo.agents.common.guided_start import GuidedStartConfig
 from murmillo.agents.common.ppo import PPOConfig
 from murmillo.agents.common.runner import RunnerConfig
 from murmillo.agents.common.warm_start import WarmStartConfig
@@ -46,6 +47,8 @@ from murmillo.agents.common.warm_start import WarmStartConfig
         (ASEConfig, "kappa", 0.0, "agent.kappa=0.0: needs a number above 0"),
         (CASEConfig, "diversity_weight", -1.0, "agent.diversity_weight=-1.0: needs at least 0"),
         (WarmStartConfig, "learning_rate", -1.0, "warm_start.learning_rate=-1.0: needs at least 0"),
+        (GuidedStartConfig, "rounds", -1, "guided_start.rounds=-1: needs at least 0"),
+        (GuidedStartConfig, "steps", 0, "guided_start.steps=0: needs at least 1"),
         (WarmStartConfig, "pairs", 0, "warm_start.pairs=0: needs at least 1"),
         (WatchConfig, "memory", 0, "runner.watch.memory=0: needs at least 1"),
         (RunnerConfig, "reward_weights", {"style": math.nan}, "runner.reward_weights.style=nan: needs a finite number"),

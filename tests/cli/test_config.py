@@ -146,8 +146,12 @@ def test_a_wrong_word_is_named_in_one_line(word: str, parts: tuple[str, ...]) ->
         (["agent.ppo.hidden=[]"], ("agent.ppo.hidden=[]", "each layer")),
         (["agent=calm", "agent.encoder.hidden=[8,0]"], ("agent.encoder.hidden=[8,0]", "each layer")),
         (["+runner.reward_weights.residual=0.1"], ("runner.reward_weights.residual=0.1", "env.residual_force")),
-        (["+runner.reward_weights.tracking=2"], ("runner.reward_weights.tracking=2", "env.tracking.on=true")),
-        (["env.tracking.on=true"], ("env.tracking.on=true", "+runner.reward_weights.tracking=2")),
+        (["+runner.reward_weights.tracking=2"], ("runner.reward_weights.tracking=2", "env.tracking.follow=true")),
+        (["guided_start.rounds=2"], ("guided_start.rounds=2", "env.tracking.follow=true")),
+        (
+            ["env.tracking.follow=true"],
+            ("env.tracking.follow=true", "+runner.reward_weights.tracking=3", "guided_start.rounds"),
+        ),
     ],
 )
 def test_an_impossible_combination_is_refused(words: list[str], parts: tuple[str, ...]) -> None:

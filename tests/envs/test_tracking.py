@@ -47,7 +47,7 @@ def tracker(
     """One world for each of the commanded skills."""
     skills = CommandedSkills(library.skills, len(skill))
     skills.put(torch.arange(len(skill)), torch.tensor(skill))
-    return Tracker(character, library, skills, TrackingConfig(on=True, **changes), len(skill)), skills
+    return Tracker(character, library, skills, TrackingConfig(follow=True, **changes), len(skill)), skills
 
 
 def at(library: MotionLibrary, clip: int, time: float) -> torch.Tensor:
@@ -90,8 +90,8 @@ def test_every_part_of_the_state_counts_but_the_joints_velocities(character, lib
     rewards = []
     for columns in (getattr(state_parts(character), part), state_parts(character).joint_velocities):
         follower, _ = tracker(character, library, [GUARD])
-        follower.begin(torch.tensor([0]), torch.tensor([GUARD]), torch.zeros(1, dtype=torch.float64))
-        state = at(library, GUARD, CONTROL_DT).clone()
+        follower.begin(torch.tensor([0]), torch.tensor([GUARD]), torch.full((1,), 2.0, dtype=torch.float64))
+        state = at(library, GUARD, 2.0 + CONTROL_DT).clone()
         state[:, columns] += 1.0
         rewards.append(follower.step(state, generator)[0].item())
     assert rewards[0] < 0.95
@@ -105,8 +105,8 @@ def test_what_a_clip_says_nothing_of_is_left_out(character, generator):
     rewards = []
     for library in (MotionLibrary(clips, character), bare):
         follower, _ = tracker(character, library, [0])
-        follower.begin(torch.tensor([0]), torch.tensor([0]), torch.zeros(1, dtype=torch.float64))
-        state = at(library, 0, CONTROL_DT).clone()
+        follower.begin(torch.tensor([0]), torch.tensor([0]), torch.full((1,), 2.0, dtype=torch.float64))
+        state = at(library, 0, 2.0 + CONTROL_DT).clone()
         state[:, sword] += 1.0
         rewards.append(follower.step(state, generator)[0].item())
     assert rewards[0] < 0.9
@@ -135,8 +135,11 @@ def test_a_skill_that_is_commanded_anew_waits_for_the_character_at_its_beginning
         assert not lost  # it may come from anywhere
         assert reward < 0.9
     follower.step(at(library, KICK, 0.0), generator)  # here it is: the clip begins
+    rest = follower.state_dict()["time"].item()
+    assert 0.05 < rest < 0.3  # which is passed over
     for step in range(1, 20):
-        assert follower.step(at(library, KICK, step * CONTROL_DT), generator)[0].item() == pytest.approx(1.0, abs=1e-4)
+        reward, _ = follower.step(at(library, KICK, rest + step * CONTROL_DT), generator)
+        assert reward.item() == pytest.approx(1.0, abs=1e-4)
 
 
 def test_patience_ends(character, library, generator):
@@ -151,25 +154,53 @@ def test_patience_ends(character, library, generator):
 def test_at_its_end_a_clip_begins_again_or_gives_way_to_another(character, library, generator):
     for switch, expected in ((0.0, {GUARD}), (1.0, {GUARD, KICK, TAUNT})):
         follower, skills = tracker(character, library, [GUARD] * 60, switch=switch)
-        end = library.duration[GUARD] - 2 * CONTROL_DT
-        follower.begin(torch.arange(60), torch.full((60,), GUARD), end.repeat(60))
-        for step in (1, 2):
-            follower.step(at(library, GUARD, end.item() + step * CONTROL_DT).expand(60, -1), generator)
+        late = library.duration[GUARD].repeat(60)
+        follower.begin(torch.arange(60), torch.full((60,), GUARD), late)  # which is rest: its last step before that
+        last = follower.state_dict()["time"][0].item() + CONTROL_DT
+        assert library.duration[GUARD] - 1.0 < last < library.duration[GUARD] - 0.1
+        follower.step(at(library, GUARD, last).expand(60, -1), generator)
         assert set(skills.current.tolist()) == expected
         stayed = skills.current == GUARD
-        reward, _ = follower.step(at(library, GUARD, CONTROL_DT).expand(60, -1), generator)
-        assert reward[stayed].min() > 0.99  # the built-in clips end as they begin
+        time = follower.state_dict()["time"]
+        assert ((time < 0) | (time > 0.1) & (time < 1.0)).all()  # on the way to a beginning, or behind its rest
+        assert (time[~stayed] < 0).all()
+        reward, _ = follower.step(at(library, GUARD, last + CONTROL_DT).expand(60, -1), generator)
+        assert (reward[stayed & (time > 0.0)] > 0.6).all()
+
+
+def test_the_guide_leads_the_pd_control_along_the_clip():
+    """Its targets are ahead of the pose by the lag, so that the joints keep up; those of the next pose are behind."""
+    behind = []
+    for lead in (True, False):
+        env = make(60, starts=UPRIGHT, tracking={"follow": True, "switch": 0.0, "lost": 9.0})
+        env.reset(seed=1)
+        tracker, error = env._tracker, []
+        assert tracker is not None
+        for _ in range(12):
+            now = tracker.state_dict()
+            nearer = now["time"] + CONTROL_DT
+            next_pose = env.character.action_for(env.library.pose(now["clip"], nearer)[0]).numpy()
+            env.step(env.guide() if lead else next_pose)
+            there = env.character.joint_coordinates(env.library.pose(now["clip"], nearer)[0])
+            error.append((env.character.joint_coordinates(env.state.qpos) - there).abs().mean().item())
+        behind.append(sum(error))
+    assert behind[0] < 0.8 * behind[1]
+
+
+def test_without_a_clip_to_follow_there_is_no_guide():
+    with pytest.raises(SuiteError, match=r"tracking\.follow=false: there is no clip to be guided along"):
+        make(1).guide()
 
 
 def test_the_environment_pays_for_following_and_ends_what_is_lost():
-    env = make(30, starts=UPRIGHT, tracking={"on": True, "lost": 0.5})
+    env = make(30, starts=UPRIGHT, tracking={"follow": True, "lost": 0.5})
     obs, _ = env.reset(seed=0)
     assert set(obs["skill"]) == {GUARD, KICK, TAUNT}
     held = np.zeros((30, 31), np.float32)
     _, _, terminated, _, info = env.step(held)
     assert 0.2 < info["side_rewards"]["tracking"].mean() <= 1.0
     assert not terminated.any()
-    strict = make(30, starts=UPRIGHT, tracking={"on": True, "lost": 0.001})
+    strict = make(30, starts=UPRIGHT, tracking={"follow": True, "lost": 0.001})
     strict.reset(seed=0)
     for _ in range(15):
         _, _, terminated, _, info = strict.step(held)
@@ -188,13 +219,13 @@ def test_following_goes_on_from_a_saved_state_bit_for_bit(generator):
     starts = {**UPRIGHT, "commanded": 0.5, "adaptive": 0.5}
     runs = []
     for saved in (False, True):
-        env = make(12, starts=starts, tracking={"on": True}, episode_steps=40)
+        env = make(12, starts=starts, tracking={"follow": True}, episode_steps=40)
         env.reset(seed=3)
         for action in actions[:40]:
             env.step(action.numpy())
         if saved:
             state = env.state_dict()
-            env = make(12, starts=starts, tracking={"on": True}, episode_steps=40)
+            env = make(12, starts=starts, tracking={"follow": True}, episode_steps=40)
             env.reset(seed=9)
             env.load_state_dict(state)
         steps = [env.step(action.numpy()) for action in actions[40:]]
@@ -218,5 +249,5 @@ def test_settings_that_cannot_be(tracking: dict[str, float], said: str):
 
 
 def test_links_are_not_followed():
-    with pytest.raises(SuiteError, match=r"tracking.on=true: needs features=character"):
-        make(1, features="links", tracking={"on": True})
+    with pytest.raises(SuiteError, match=r"tracking.follow=true: needs features=character"):
+        make(1, features="links", tracking={"follow": True})
