@@ -47,6 +47,7 @@ class HumanoidVectorEnv(VectorEnv):
         heights: [N, 35, 35] float32, the ground about the root (only on uneven ground; `Terrain.map`).
         skill: [N] int64, the commanded label, an index into `skills`; random and independent of the start, but for the
             share `starts.commanded` of the starts in a clip.
+        guide: [N, 31] float32, the action that leads along the clip from whatever state (only with `tracking.follow`).
         window: [N, W, 120] float32, the last W states, oldest first (only if `window` > 1); [N, W, 7 B] of links. After
             a reference start its past is the clip's own, after other starts the first state repeated.
 
@@ -263,19 +264,6 @@ class HumanoidVectorEnv(VectorEnv):
         """The current observation, which a `set_skill` since the last step has changed."""
         return self._shown(self._observation())
 
-    @at_home
-    def guide(self) -> Any:
-        """The action [N, A] that leads each character along its clip, in whatever state it is.
-
-        Raises:
-            SuiteError: nothing is followed.
-        """
-        if self._tracker is None:
-            raise SuiteError("tracking.follow=false: there is no clip to be guided along; set tracking.follow=true")
-        action = torch.zeros(self.num_envs, self._action_dim, dtype=self.state.qpos.dtype)
-        action[:, : self.character.action_dim] = self._tracker.guide()
-        return self._shown(action.float())
-
     # --- checkpoints -------------------------------------------------------------------------------------------------
 
     @at_home
@@ -321,6 +309,8 @@ class HumanoidVectorEnv(VectorEnv):
         if self.task.goal_dim:
             observations["goal"] = box((self.task.goal_dim,))
         self._action_dim = self.character.action_dim + self._forces.residual_dim
+        if self.config.tracking.follow:
+            observations["guide"] = box((self._action_dim,))
         self.single_observation_space = gymnasium.spaces.Dict(observations)
         self.single_action_space = gymnasium.spaces.Box(-1.0, 1.0, (self._action_dim,), np.float32)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
@@ -388,7 +378,15 @@ class HumanoidVectorEnv(VectorEnv):
         observation = {**self._observer.observation(self._steps), "skill": self._skills.current.clone()}
         if self.task.goal_dim:
             observation["goal"] = self.task.goal(self.state)
+        if self._tracker is not None:
+            observation["guide"] = self._guide(self._tracker)
         return observation
+
+    def _guide(self, tracker: Tracker) -> Tensor:
+        """[N, A] what leads along the clips, without residual forces."""
+        action = torch.zeros(self.num_envs, self._action_dim)
+        action[:, : self.character.action_dim] = tracker.guide()
+        return action
 
     def _shown(self, result: Any) -> Any:
         """The tensors in a result as the environment gives them out: on its device, or as arrays."""

@@ -2,9 +2,9 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Any, Protocol
 
 import torch
+from gymnasium.vector import VectorEnv
 from torch import Tensor
 from torch.nn import functional as F
 
@@ -43,20 +43,6 @@ class GuidedStartConfig:
         check_at_least(1, self, "guided_start", "steps", "updates", "minibatch")
 
 
-class Guided(Protocol):
-    """A vector environment that knows for each world what leads along its clip."""
-
-    num_envs: int
-
-    def reset(self, *, seed: int | None = None) -> tuple[dict[str, Any], dict[str, Any]]: ...
-
-    def step(self, actions: Any) -> tuple[dict[str, Any], Any, Any, Any, dict[str, Any]]: ...
-
-    def guide(self) -> Any:
-        """Actions [N, A]."""
-        ...
-
-
 @dataclass(frozen=True)
 class Round:
     """
@@ -71,7 +57,7 @@ class Round:
 
 def guided_start(
     model: ActorCritic,
-    env: Guided,
+    env: VectorEnv,
     config: GuidedStartConfig,
     generator: torch.Generator,
     condition: Callable[[Tensor], Told] = lambda skill: None,
@@ -84,7 +70,7 @@ def guided_start(
 
     Args:
         model: whose policy is fitted; its normaliser learns too, its critic does not.
-        env: its observations have "state" `[N, S]` and "skill" `[N]`.
+        env: its observations have "state" `[N, S]`, "skill" `[N]` and "guide" `[N, A]`.
         config: how long and how fast.
         generator: draws noise, minibatches and the environment's seed.
         condition: draws what the policy is told of states with these labels `[n]`.
@@ -101,7 +87,7 @@ def guided_start(
         own = torch.rand(env.num_envs, generator=generator) < (_OWN if number else 0.0)
         judged, ends = own if number else ~own, 0
         for _ in range(config.steps):
-            guide = torch.as_tensor(env.guide())
+            guide = obs["guide"]
             for kept, seen in ((states, obs["state"]), (skills, obs["skill"]), (guides, guide)):
                 kept.append(seen.clone())
             with torch.no_grad():

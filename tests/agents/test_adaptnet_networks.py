@@ -47,15 +47,15 @@ def test_the_standard_deviation_begins_as_configured_and_depends_on_the_state(ge
 
 
 def test_the_standard_deviation_does_not_shrink_below_its_least(generator: torch.Generator) -> None:
-    policy = RecurrentPolicy(HistoryEncoder(3, 2, 8, generator), 4, (16, 16), 0.05, generator, std_least=0.04)
+    policy = RecurrentPolicy(HistoryEncoder(3, 2, 8, generator), 4, (16, 16), 0.05, generator, std_least=0.045)
     state, told = torch.randn(9, 4, 3, generator=generator), {"goal": torch.randn(9, 2, generator=generator)}
     with torch.no_grad():
         policy.spread.weight *= 1e4
-    std = policy.moments(policy(state, told))[1].exp()
+    std = policy.moments(policy(state, told))[1].exp().detach()
     free = make_policy(generator)
     free.load_state_dict(policy.state_dict())
-    torch.testing.assert_close(std, free.moments(free(state, told))[1].exp().clamp_min(0.04))
-    assert std.min() == pytest.approx(0.04)
+    torch.testing.assert_close(std, free.moments(free(state, told))[1].exp().detach().clamp_min(0.045))
+    assert std.min() == pytest.approx(0.045, rel=1e-4)
     assert std.max() > 0.05
 
 

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
+from gymnasium.vector import VectorEnv
 
 from murmillo.agents.common.guided_start import GuidedStartConfig, guided_start
 from murmillo.agents.common.ppo import ActorCritic, PPOConfig
@@ -12,7 +13,7 @@ from murmillo.agents.common.ppo import ActorCritic, PPOConfig
 GOALS = torch.tensor([[0.6, 0.0], [-0.6, 0.3]])
 
 
-class Slope:
+class Slope(VectorEnv):
     """Points that are led to the goal of their label, and roll away from it."""
 
     num_envs, tensors = 64, True
@@ -22,7 +23,7 @@ class Slope:
         self.taken: list[torch.Tensor] = []
         self.left: list[torch.Tensor] = []
 
-    def reset(self, *, seed: int | None = None) -> tuple[dict[str, Any], dict[str, Any]]:
+    def reset(self, *, seed: int | None = None, options: Any = None) -> tuple[dict[str, Any], dict[str, Any]]:
         self.place = torch.randn(64, 2, generator=self.generator) * 0.1
         self.skill = torch.arange(64) % 2
         return self._seen(), {}
@@ -39,7 +40,7 @@ class Slope:
         return (GOALS[self.skill] - self.place).clamp(-1.0, 1.0)
 
     def _seen(self) -> dict[str, torch.Tensor]:
-        return {"state": self.place.clone(), "skill": self.skill}
+        return {"state": self.place.clone(), "skill": self.skill, "guide": self.guide()}
 
 
 def make(generator: torch.Generator) -> ActorCritic:

@@ -182,7 +182,7 @@ def test_an_adapted_calm(murmillo: Murmillo, folder: Path, tiny: tuple[str, ...]
 
 
 def test_evaluation_and_comparison(murmillo: Murmillo, own: Path, folder: Path) -> None:
-    asked = ("worlds=2", "trajectories=1", "metrics=quality")
+    asked = ("worlds=2", "trajectories=4", "metrics=quality")
     status, out, err = murmillo("evaluate", "run=runs/hills", *asked)
     assert status == 0, err
     assert "commanded skill's head" in out

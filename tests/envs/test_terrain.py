@@ -115,7 +115,7 @@ def test_what_is_observed_of_a_start_does_not_depend_on_where_it_is(kind: str) -
     for env in (flat, uneven):
         env.reset(seed=3)
         env._starts.forget()
-    starts = [env._starts.draw(env._fell, torch.Generator().manual_seed(5)) for env in (flat, uneven)]
+    starts = [env._starts.draw(torch.arange(8), env._fell, torch.Generator().manual_seed(5)) for env in (flat, uneven)]
     terrain, env = ground_of(uneven), uneven
     by = terrain.settle(env.character, starts[1].qpos, torch.arange(8), torch.Generator().manual_seed(0))
     moved = env._starts.moved(starts[1], by)

@@ -173,23 +173,18 @@ def test_the_guide_leads_the_pd_control_along_the_clip():
     behind = []
     for lead in (True, False):
         env = make(60, starts=UPRIGHT, tracking={"follow": True, "switch": 0.0, "lost": 9.0})
-        env.reset(seed=1)
+        obs, _ = env.reset(seed=1)
         tracker, error = env._tracker, []
         assert tracker is not None
         for _ in range(12):
             now = tracker.state_dict()
             nearer = now["time"] + CONTROL_DT
             next_pose = env.character.action_for(env.library.pose(now["clip"], nearer)[0]).numpy()
-            env.step(env.guide() if lead else next_pose)
+            obs = env.step(obs["guide"] if lead else next_pose)[0]
             there = env.character.joint_coordinates(env.library.pose(now["clip"], nearer)[0])
             error.append((env.character.joint_coordinates(env.state.qpos) - there).abs().mean().item())
         behind.append(sum(error))
     assert behind[0] < 0.8 * behind[1]
-
-
-def test_without_a_clip_to_follow_there_is_no_guide():
-    with pytest.raises(SuiteError, match=r"tracking\.follow=false: there is no clip to be guided along"):
-        make(1).guide()
 
 
 def test_the_environment_pays_for_following_and_ends_what_is_lost():
@@ -211,7 +206,9 @@ def test_the_environment_pays_for_following_and_ends_what_is_lost():
 def test_nothing_is_followed_unless_asked_for():
     env = make(2)
     env.reset(seed=0)
-    assert "side_rewards" not in env.step(np.zeros((2, 31), np.float32))[4]
+    obs, _, _, _, info = env.step(np.zeros((2, 31), np.float32))
+    assert "side_rewards" not in info
+    assert "guide" not in obs
 
 
 def test_following_goes_on_from_a_saved_state_bit_for_bit(generator):
