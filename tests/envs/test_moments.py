@@ -1,8 +1,11 @@
 """Where in the clips episodes begin."""
 
+import gymnasium
+import numpy as np
 import pytest
 import torch
 
+from murmillo.envs import HumanoidVectorEnv
 from murmillo.envs.character import load_character
 from murmillo.envs.moments import StartingMoments
 from murmillo.envs.motion import MotionLibrary, load_clips
@@ -58,3 +61,28 @@ def test_a_share_of_falls_is_that_of_late_episodes(library):
     assert moments.falls[5].item() == pytest.approx(0.0, abs=1e-3)
     assert moments.falls[0].item() == 1.0
     moments.note(torch.tensor([], dtype=torch.int64), torch.tensor([], dtype=torch.bool))
+
+
+@pytest.mark.parametrize("falling", [False, True])
+def test_the_environment_counts_how_episodes_end(falling: bool):
+    """Those of three steps end by the clock; a clip that is lost at once ends as by a fall."""
+    env = gymnasium.make_vec(
+        "murmillo/Imitation-v0",
+        num_envs=20,
+        threads=1,
+        clips=("guard", "kick"),
+        episode_steps=300 if falling else 3,
+        starts={"reference": 1.0, "fallen": 0.0, "recovery": 0.0, "commanded": 1.0, "adaptive": 0.5},
+        tracking={"follow": falling, "lost": 0.0},
+    )
+    assert isinstance(env, HumanoidVectorEnv)
+    env.reset(seed=0)
+    ended = 0
+    for _ in range(30):
+        _, _, terminated, truncated, _ = env.step(np.zeros((20, 31), np.float32))
+        ended += int(terminated.sum() if falling else truncated.sum())
+    assert ended > 20
+    falls = env._starts.state_dict()["falls"]
+    assert (falls == 1.0).all() if falling else falls.mean() < 0.8
+    env.reset(seed=0)  # a new seed knows of no falls
+    assert (env._starts.state_dict()["falls"] == 1.0).all()
