@@ -20,7 +20,5 @@ def for_playing(env: EnvConfig) -> EnvConfig:
 
     Nobody has a clip to follow there, nor loses it.
     """
-    followed = TrackingConfig()
-    return dataclasses.replace(
-        env, physics="cpu", device="auto", tensors=False, contacts=0, constraints=0, tracking=followed
-    )
+    here = {"physics": "cpu", "device": "auto", "tensors": False, "contacts": 0, "constraints": 0}
+    return dataclasses.replace(env, **here, tracking=TrackingConfig())

@@ -1,6 +1,7 @@
 """One run from its settings to its report: build, warm start, train, measure, film, report."""
 
 import dataclasses
+import math
 import shutil
 import signal
 import subprocess
@@ -220,8 +221,10 @@ def _warm_start(config: TrainConfig, runner: Runner, generator: torch.Generator,
         made = guided_start(agent.model, env, config.guided_start, generator, agent.draw_condition)
         for number, round_ in enumerate(made, start=1):
             who = "policy" if number > 1 else "guide"
-            came = f"the {who} goes on for {round_.length:.0f} steps, squared error {round_.loss:.5f}"
-            progress.say(f"guided start: round {number}, {came}")
+            length = f"{round_.length:.0f} steps" if math.isfinite(round_.length) else "the whole round"
+            progress.say(
+                f"guided start: round {number}, the {who} goes on for {length}, squared error {round_.loss:.5f}"
+            )
     runner.ranks.copy_first(agent.model)  # all did the same, but not all processors round alike
     state = {"meta": runner.meta, "agent": agent.state_dict()}
     if runner.ranks.first:

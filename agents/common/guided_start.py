@@ -1,12 +1,12 @@
 """A head start in the simulation: the policy learns what leads along the clips in the states that it comes into."""
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import torch
 from gymnasium.vector import VectorEnv
 from torch import Tensor
-from torch.nn import functional as F
 
 from murmillo.agents.common.exploration import ActionNoise
 from murmillo.agents.common.networks import Told
@@ -14,6 +14,7 @@ from murmillo.agents.common.numbers import check_at_least
 from murmillo.agents.common.ppo import ActorCritic
 from murmillo.agents.common.rollout import taken, tensors
 from murmillo.agents.common.training import adam
+from murmillo.agents.common.warm_start import regress
 
 _NOISE, _CORRELATION = 0.02, 0.9
 """Standard deviation of what is added to all actions, and how long it lasts."""
@@ -48,7 +49,8 @@ class Round:
     """
     Attributes:
         loss: mean squared error of the action over the round's last updates.
-        length: mean length of an episode where the policy acted [steps], or the guide in the first round.
+        length: mean length of an episode where the policy acted [steps], or the guide in the first round; infinite
+            where none has ended.
     """
 
     loss: float
@@ -99,7 +101,8 @@ def guided_start(
         normalise.update(torch.stack(states[-config.steps :]))
         losses = _learn(model, optimizer, config, generator, condition, *map(torch.cat, (states, skills, guides)))
         tail = losses[-50:]
-        yield Round(sum(tail) / len(tail), int(judged.sum()) * config.steps / max(ends, 1))
+        length = int(judged.sum()) * config.steps / ends if ends else math.inf
+        yield Round(sum(tail) / len(tail), length)
 
 
 def _learn(
@@ -116,11 +119,6 @@ def _learn(
     losses = []
     for _ in range(config.updates):
         rows = torch.randint(len(state), (config.minibatch,), generator=generator)
-        told = condition(skill[rows])
-        mean = model.policy.mode(model.policy(model.state_normalizer(state[rows]), told))
-        loss = F.mse_loss(mean, guide[rows])
-        optimizer.zero_grad()
-        loss.backward()
-        optimizer.step()
-        losses.append(loss.item())
+        seen, told = model.state_normalizer(state[rows]), condition(skill[rows])
+        losses.append(regress(model, optimizer, seen, told, guide[rows]))
     return losses

@@ -75,10 +75,14 @@ def warm_start(
         wanted = labels[step % _CONDITIONS]
         place = torch.rand(config.minibatch, generator=generator) * count[wanted]
         rows = of_skill[first[wanted] + place.long()]
-        mean = model.policy.mode(model.policy(state[rows], conditions[step % _CONDITIONS]))
-        loss = F.mse_loss(mean, action[rows])
-        optimizer.zero_grad()
-        loss.backward()
-        optimizer.step()
-        losses.append(loss.item())
+        losses.append(regress(model, optimizer, state[rows], conditions[step % _CONDITIONS], action[rows]))
     return losses
+
+
+def regress(model: ActorCritic, optimizer: torch.optim.Optimizer, state: Tensor, told: Told, action: Tensor) -> float:
+    """One step of the policy towards the actions [n, A] in these normalised states [n, S]; the mean squared error."""
+    loss = F.mse_loss(model.policy.mode(model.policy(state, told)), action)
+    optimizer.zero_grad()
+    loss.backward()
+    optimizer.step()
+    return loss.item()
