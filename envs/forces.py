@@ -43,6 +43,12 @@ class OutsideForces:
         pushed = self._at(0 if body is None else self._bodies.index(body), force_w)
         self._push_w = pushed if self._push_w is None else self._push_w + pushed
 
+    def residual_action(self, force_h: Tensor) -> Tensor:
+        """The part [N, residual_dim] of an action whose forces are these of all bodies [N, B, 3] [N], heading frame."""
+        if self._residual is None:
+            return force_h.new_zeros(len(force_h), 0)
+        return self._residual.action_for(force_h)
+
     def of_step(self, action: Tensor, state: State, task_push: Tensor | None) -> Tensor | None:
         """[N, B, 3] forces throughout the coming step, world axes [N]; None where nothing acts.
 

@@ -36,6 +36,10 @@ class ResidualForces:
         force_w[:, self._bodies] = quat_rotate(heading_quat(state.qpos[:, None, 3:7]), force_h)
         return force_w
 
+    def action_for(self, force_h: Tensor) -> Tensor:
+        """The action [N, 45] whose forces are these of all bodies [N, B, 3] [N], heading frame, as far as it goes."""
+        return (force_h[:, self._bodies] / self.scale).clamp(-1.0, 1.0).flatten(1)
+
     def reward(self, action: Tensor) -> Tensor:
         """r_f [N], 1 without any force: exp(-sum_j |xi_j|), or with the mean over the joints in place of the sum.
 

@@ -11,6 +11,8 @@ from murmillo.envs.motion import MotionLibrary
 from murmillo.envs.observations import StateParts, state_parts
 from murmillo.envs.skills import CommandedSkills
 
+_ON_TIME = 1e-9
+"""[s] by which times that are meant to be one may differ."""
 _SEAM = 0.5
 """[s] A clip does not begin again in its last half second."""
 _SETTLED = 0.25
@@ -19,6 +21,12 @@ _LOOP = 1.0
 """Weighted squares by which a clip's beginning may differ from its end for it to begin there again."""
 _REST = 0.2
 """Weighted squares by which a pose may differ from a clip's first or last and still be taken for rest."""
+_PACES = (1.0, 0.0, 2.0)
+"""Of a clip's clock: as time goes, waiting for a character that is behind, following one that is ahead."""
+_NEARER = 0.7
+"""A clip waits or hurries where its error is then less than this of what it would be."""
+_WAITED = 0.3
+"""What is left of the reward while the clip waits: who stays where it is has not followed."""
 
 
 @dataclass
@@ -54,7 +62,8 @@ class Tracker:
     Who was started in a clip of its own skill goes on there. Whoever is commanded another skill turns to the beginning
     of one of its clips: until the character is near that, or patience is over, the clip waits. A clip that has ended
     goes on where it is most like its end, which of the built-in ones is their beginning, or gives way to another skill.
-    Rest at a clip's beginning and end is passed over: who sees only its state cannot tell the one from the other.
+    Rest at a clip's beginning and end is passed over: who sees only its state cannot tell the one from the other. For
+    the same reason a clip waits for whoever is behind, which is then paid less, and hurries after whoever is ahead.
 
     What is compared is `character_state`, so that neither place nor heading count, but the speeds do.
     """
@@ -93,36 +102,49 @@ class Tracker:
             generator: draws clips and skills.
 
         Returns:
-            reward [N] in [0, 1], weighted exponentials of the errors as in DeepMimic (Peng et al. 2018, section 5);
-            lost [N] bool.
+            reward [N] in [0, 1], weighted exponentials of the errors as in DeepMimic (Peng et al. 2018, section 5), of
+            two widths each; lost [N] bool.
         """
         others = (self._library.clip_skill[self._clip] != self._skills.current).nonzero().squeeze(-1)
         if len(others):
             self.turn(others, generator)
-        self._time = self._time + CONTROL_DT
-        wanted = self._library.frames(self._clip, self._time.clamp_min(0.0), 1)[:, 0]
-        error = state - wanted
-        if self._library.mask is not None:
-            error = error.masked_fill(self._library.mask[self._clip], 0.0)
-        rotations, root, velocity, keys = _squares(error, self._parts)
-        reward = 0.4 * (-rotations).exp() + 0.2 * ((-root).exp() + (-velocity).exp() + (-keys).exp())
-        distance = error[:, self._parts.keys].unflatten(-1, (-1, 3)).norm(dim=-1).mean(-1)
         first = self._first[self._clip]
+        before, begun = self._time, self._time >= first - _ON_TIME
+        self._time, squares, distance = self._nearest(state, begun)
+        reward = (torch.tensor([[0.4], [0.2], [0.2], [0.2]]) * _likeness(squares)).sum(0)
+        reward = torch.where(self._time > before, reward, _WAITED * reward)
         lost = (distance > self._config.lost) & (self._time > first + _SETTLED)
         there = (self._time < first) & ((distance < self._config.near) | (self._time >= 0.0))
         self._time = torch.where(there, first, self._time)
         self._end(generator)
         return reward, lost
 
-    def guide(self) -> Tensor:
-        """The actions [N, A] that lead along the clips, in whatever states the worlds are.
+    def wanted(self, ahead: float) -> tuple[Tensor, Tensor]:
+        """Poses [N, nq] and velocities [N, nv] of the clips so much later than now [s]."""
+        clip, time = self._clip, self._time.clamp_min(0.0) + ahead
+        later = torch.where(time > self._last[clip], self._again[clip] + time - self._last[clip], time)
+        return self._library.pose(clip, torch.maximum(later, self._first[clip]))
 
-        Their targets are the clips' poses as much later as the PD control lags behind (`Character.lag`).
+    def _nearest(self, state: Tensor, begun: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """A control step on, at the pace that keeps the clip nearest to the character, where it has begun [N] bool.
+
+        A policy sees no clock: were the clip's to run on, one that is late would never be right again.
+
+        Returns:
+            time [N] [s]; weighted squares [4, N] of the errors; mean distance of the key points [N] [m].
         """
-        clip, time = self._clip, self._time.clamp_min(0.0) + self._character.lag
-        ahead = torch.where(time > self._last[clip], self._again[clip] + time - self._last[clip], time)
-        qpos, qvel = self._library.pose(clip, torch.maximum(ahead, self._first[clip]))
-        return self._character.action_for(self._character.from_base(qpos, qvel)[0])
+        times = self._time + CONTROL_DT * torch.tensor(_PACES, dtype=torch.float64).unsqueeze(-1)
+        clips = self._clip.expand_as(times)
+        wanted = self._library.frames(clips.flatten(), times.flatten().clamp_min(0.0), 1)[:, 0]
+        error = state - wanted.unflatten(0, times.shape)
+        if self._library.mask is not None:
+            error = error.masked_fill(self._library.mask[self._clip], 0.0)
+        squares = torch.stack(_squares(error, self._parts))
+        distance = error[..., self._parts.keys].unflatten(-1, (-1, 3)).norm(dim=-1).mean(-1)
+        apart = squares.sum(0)
+        apart[0] = torch.where(begun, _NEARER * apart[0], -1.0)
+        chosen, worlds = apart.argmin(0), torch.arange(len(state))
+        return times[chosen, worlds], squares[:, chosen, worlds], distance[chosen, worlds]
 
     def _end(self, generator: torch.Generator) -> None:
         """Where clips are over they begin again, or other skills are commanded."""
@@ -160,11 +182,16 @@ class Tracker:
 
 
 def _squares(error: Tensor, parts: StateParts) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-    """Weighted squares [n] of the errors [n, 120] in joints' rotations, root, root's velocities and key points."""
+    """Weighted squares [...] of the errors [..., 120] in joints' rotations, root, root's velocities and key points."""
 
     def square(columns: slice) -> Tensor:
-        return error[:, columns].square().sum(-1)
+        return error[..., columns].square().sum(-1)
 
     root = 600.0 * square(parts.height) + 15.0 * square(parts.rotation)
     velocity = 6.0 * square(parts.linear) + 0.6 * square(parts.angular)
     return 3.0 * square(parts.joints), root, velocity, 9.0 * square(parts.keys)
+
+
+def _likeness(squares: Tensor) -> Tensor:
+    """1 for none, two exponentials of weighted squares: the wider one still leads where the narrow one is flat."""
+    return 0.5 * ((-squares).exp() + (-0.2 * squares).exp())

@@ -19,6 +19,7 @@ from murmillo.envs.errors import SuiteError
 from murmillo.envs.falls import FallDetector, count_every_contact
 from murmillo.envs.features import make_features
 from murmillo.envs.forces import OutsideForces
+from murmillo.envs.guide import Guide
 from murmillo.envs.motion import MotionLibrary, load_clips
 from murmillo.envs.motion.demonstrations import Demonstrations
 from murmillo.envs.observer import Observer, box
@@ -47,7 +48,7 @@ class HumanoidVectorEnv(VectorEnv):
         heights: [N, 35, 35] float32, the ground about the root (only on uneven ground; `Terrain.map`).
         skill: [N] int64, the commanded label, an index into `skills`; random and independent of the start, but for the
             share `starts.commanded` of the starts in a clip.
-        guide: [N, 31] float32, the action that leads along the clip from whatever state (only with `tracking.follow`).
+        guide: [N, A] float32, the action that leads along the clip from whatever state (only with `tracking.follow`).
         window: [N, W, 120] float32, the last W states, oldest first (only if `window` > 1); [N, W, 7 B] of links. After
             a reference start its past is the clip's own, after other starts the first state repeated.
 
@@ -130,9 +131,10 @@ class HumanoidVectorEnv(VectorEnv):
         self._steps = torch.zeros(num_envs, dtype=torch.int64)
         self._free_steps = torch.zeros(num_envs, dtype=torch.int64)
         self._skills = CommandedSkills(self.library.skills, num_envs)
-        self._tracker = None
+        self._tracker = self._guide = None
         if config.tracking.follow:
             self._tracker = Tracker(self.character, self.library, self._skills, config.tracking, num_envs)
+            self._guide = Guide(self.character, self._tracker, self._forces)
         self._ended = torch.zeros(num_envs, dtype=torch.bool)
         self._fell = torch.zeros(num_envs, dtype=torch.bool)
 
@@ -140,6 +142,11 @@ class HumanoidVectorEnv(VectorEnv):
     def skills(self) -> tuple[str, ...]:
         """Names of the labels that `skill` counts."""
         return self.library.skills
+
+    @property
+    def residual_dim(self) -> int:
+        """How many of an action's numbers, its last, are residual forces."""
+        return self._forces.residual_dim
 
     @property
     def tensors(self) -> bool:
@@ -308,7 +315,7 @@ class HumanoidVectorEnv(VectorEnv):
         observations = {**self._observer.spaces(), "skill": gymnasium.spaces.Discrete(len(self.skills))}
         if self.task.goal_dim:
             observations["goal"] = box((self.task.goal_dim,))
-        self._action_dim = self.character.action_dim + self._forces.residual_dim
+        self._action_dim = self.character.action_dim + self.residual_dim
         if self.config.tracking.follow:
             observations["guide"] = box((self._action_dim,))
         self.single_observation_space = gymnasium.spaces.Dict(observations)
@@ -378,15 +385,9 @@ class HumanoidVectorEnv(VectorEnv):
         observation = {**self._observer.observation(self._steps), "skill": self._skills.current.clone()}
         if self.task.goal_dim:
             observation["goal"] = self.task.goal(self.state)
-        if self._tracker is not None:
-            observation["guide"] = self._guide(self._tracker)
+        if self._guide is not None:
+            observation["guide"] = self._guide.action(self.state, self._observer.ground)
         return observation
-
-    def _guide(self, tracker: Tracker) -> Tensor:
-        """[N, A] what leads along the clips, without residual forces."""
-        action = torch.zeros(self.num_envs, self._action_dim)
-        action[:, : self.character.action_dim] = tracker.guide()
-        return action
 
     def _shown(self, result: Any) -> Any:
         """The tensors in a result as the environment gives them out: on its device, or as arrays."""

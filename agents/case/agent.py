@@ -10,6 +10,7 @@ from torch import Tensor
 from murmillo.agents.case.config import CASEConfig
 from murmillo.agents.case.focal import FocalSampling
 from murmillo.agents.case.networks import Encoder, LabelEmbedding, SkillHeads
+from murmillo.agents.common.assistance import Assistance
 from murmillo.agents.common.base import EYE, Base, take_over
 from murmillo.agents.common.blending import Blending
 from murmillo.agents.common.dimensions import dimensions, skill_count
@@ -101,6 +102,7 @@ class CASE(Blending):
         )
         self.replay = Replay(config.discriminator.replay_size, config.discriminator.replay_keep, ranks)
         self.focal = FocalSampling(labels, config)
+        self.assistance = Assistance(self.model, env, config.assistance)
         self.masks = FeatureMasks(demonstrations, labels)
         self.iterations = 0
         self._parts = {
@@ -112,6 +114,7 @@ class CASE(Blending):
             "replay": self.replay,
             "latents": self.latents,
             "focal": self.focal,
+            "assistance": self.assistance,
             **({EYE: self.eye} if self.base else {}),
         }
         # known before the first update, lest that judges windows in raw units and every later one in other units
@@ -199,6 +202,7 @@ class CASE(Blending):
         )
         demonstrations = self._draw_demonstrations()
         heads = self._practise(rollout, demonstrations)
+        assistance = self.assistance.update(rollout, self.iterations)
         self.iterations += 1
         self.replay.add({"window": windows, "label": labels}, generator, rollout.part)
         self.discriminator.normalizer.update(rollout["next_state"], ranks=rollout.ranks)
@@ -207,6 +211,7 @@ class CASE(Blending):
             named("discriminator", means.result(rollout.ranks))
             | named("heads", heads)
             | named("focal", self.focal.scalars())
+            | named("assistance", assistance)
             | named("ppo", ppo)
         )
 

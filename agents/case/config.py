@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 
+from murmillo.agents.common.assistance import AssistanceConfig
 from murmillo.agents.common.discriminator import DiscriminatorConfig
 from murmillo.agents.common.errors import AgentError
 from murmillo.agents.common.numbers import check_above_zero, check_at_least
@@ -39,6 +40,7 @@ class CASEConfig(SkillConfig):
         focal_floor: least probability of a skill, as a share of the uniform (released code).
         guide_weight: of the squared distance of the policy's mean from what leads along the clip (the observation
             "guide"), throughout training; it keeps the labels that a guided start has taught.
+        assistance: how residual forces fade.
         upright_iterations: first iterations in which only the feet may touch the ground; 0 for no such curriculum.
         discriminator: its dropout is the element-wise feature masking.
     """
@@ -59,6 +61,7 @@ class CASEConfig(SkillConfig):
     focal_floor: float = 0.01
     guide_weight: float = 0.0
     upright_iterations: int = 15_000
+    assistance: AssistanceConfig = field(default_factory=AssistanceConfig)
     ppo: PPOConfig = field(default_factory=lambda: PPOConfig(style_hidden=()))
     discriminator: DiscriminatorConfig = field(
         default_factory=lambda: DiscriminatorConfig(hidden=(1024, 512), dropout=0.2)

@@ -15,7 +15,8 @@ from torch import Tensor
 from murmillo.agents.common.errors import AgentError
 
 FORMAT = "murmillo-checkpoint"
-VERSION = 1
+VERSION = 2
+"""Grows whenever what is saved takes another form."""
 TENSORS = "tensors.safetensors"
 META = "meta.json"
 
@@ -68,7 +69,10 @@ def load(folder: Path | str) -> dict[str, Any]:
     if not isinstance(meta, dict) or meta.get("format") != FORMAT:
         raise AgentError(f"{folder / META} is no {FORMAT} file")
     if meta.get("version") != VERSION:
-        raise AgentError(f"{folder} is a checkpoint of version {meta.get('version')}; this program reads {VERSION}")
+        raise AgentError(
+            f"{folder} is a checkpoint of version {meta.get('version')}, this program's are of version {VERSION}: "
+            "train it anew, or use the commit in the run's versions.json"
+        )
     damaged = AgentError(f"{folder / TENSORS} is damaged or of another save; take an earlier checkpoint")
     if _crc32(folder / TENSORS) != meta.get("tensors_crc32") or not isinstance(meta.get("values"), dict):
         raise damaged

@@ -119,6 +119,8 @@ class Policy(nn.Module):
     """From the last hidden layer to the mean."""
     log_std: Tensor
     """`[A]`, where it depends on no state."""
+    reach: Tensor
+    """`[A]`, what is left of the mean of each number of an action where some of them fade (`Assistance`)."""
 
     def forward(self, state: Tensor, told: Told = None) -> Tensor:
         """Parameters `[..., P]` of the actions in normalised states `[..., D]`, under what the policy is told."""
@@ -142,7 +144,7 @@ class Policy(nn.Module):
 
     def moments(self, parameters: Tensor) -> tuple[Tensor, Tensor]:
         """Mean `[..., A]` and logarithm of the standard deviation, `[..., A]` or `[A]`."""
-        return parameters, self.log_std
+        return parameters * self.reach, self.log_std
 
     def sample(self, parameters: Tensor, noise: ActionNoise) -> Tensor:
         """Actions `[N, A]` drawn from the distributions with these parameters `[N, P]`."""
@@ -202,6 +204,7 @@ class GaussianPolicy(Policy):
         self.head = linear(hidden[-1], action_dim, generator)
         with torch.no_grad():
             self.head.weight *= mean_init_scale
+        self.register_buffer("reach", torch.ones(action_dim))
         log_std = torch.full((action_dim,), std).log()
         if learn_std:
             self.log_std = nn.Parameter(log_std)

@@ -62,6 +62,8 @@ class PPOConfig:
             acted [nat]; None goes on.
         lead_kl: lead the policy's learning rate from `policy_learning_rate` to where the mean KL of an iteration is
             about this [nat]; None keeps it.
+        critic_first: iterations at the beginning in which the critic learns alone. On a critic that knows nothing the
+            first steps of a policy that has been fitted to something undo it.
         kl_halving: iterations after which both KLs are half of what is asked for here, then a third and so on; 0 keeps
             them. Large steps find balance, small ones keep it.
     """
@@ -85,12 +87,13 @@ class PPOConfig:
     target_kl: float | None = None
     lead_kl: float | None = None
     kl_halving: int = 0
+    critic_first: int = 0
 
     def __post_init__(self) -> None:
         check_at_least(1, self, "agent.ppo", "epochs", "minibatch")
         check_at_least(0, self, "agent.ppo", "policy_learning_rate", "value_learning_rate", "std_learning_rate")
         check_at_least(0, self, "agent.ppo", "mean_init_scale", "bound_weight", "value_weight", "kl_halving")
-        check_at_least(0, self, "agent.ppo", "std_least")
+        check_at_least(0, self, "agent.ppo", "std_least", "critic_first")
         check_above_zero(self, "agent.ppo", "std", "clip", "max_grad_norm", "target_kl", "lead_kl")
         if self.std_least > self.std:
             raise AgentError(f"agent.ppo.std_least={self.std_least}: needs at most std, {self.std}")
@@ -241,15 +244,18 @@ class PPO:
         data["state"] = self.model.state_normalizer(rollout.flat("state"))
         data["target"] = self.model.targets(rollout)
 
-        means = Means()
+        means, alone = Means(), self._iterations < config.critic_first
         calm = 1 + self._iterations / config.kl_halving if config.kl_halving else 1.0
         passes = [rollout.minibatches(config.minibatch, generator) for _ in range(config.epochs)]
         for rows, part in chain.from_iterable(passes):
             batch = Minibatch({name: value.index_select(0, rows) for name, value in data.items()}, part)
-            losses, scores = self._losses(batch, condition(batch), extra_loss, other_loss)
+            told = condition(batch)
+            losses, scores = self._losses(batch, _cut(told) if alone else told, extra_loss, other_loss)
             means.add({**losses, **scores})
             if config.target_kl is not None and rollout.ranks.mean(scores["kl"]) > config.target_kl / calm:
                 break
+            if alone:
+                losses = {"value": losses["value"]}
             minimise(self.optimizer, losses, config.max_grad_norm, ranks=rollout.ranks)
             self._keep_noise()
         self.model.observe(rollout)
@@ -257,6 +263,8 @@ class PPO:
         stats = means.result(rollout.ranks)
         if config.lead_kl is None:
             return stats
+        if alone:
+            return stats | {"policy_rate": 0.0}
         return stats | {"policy_rate": self._lead(stats["kl"] * calm / config.lead_kl)}
 
     @torch.no_grad()
@@ -324,3 +332,10 @@ class PPO:
         self._iterations = state["iterations"]
         if self.config.lead_kl is not None:
             self._set_pace(state["pace"])
+
+
+def _cut(told: Told) -> Told:
+    """What is told, with no way back to what made it."""
+    if told is None or isinstance(told, Tensor):
+        return told if told is None else told.detach()
+    return {name: part.detach() for name, part in told.items()}

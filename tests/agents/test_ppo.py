@@ -201,3 +201,32 @@ def test_a_led_rate_goes_on_where_it_was(generator: torch.Generator) -> None:
         other.load_state_dict(ppo.state_dict())
     assert again.optimizer.param_groups[0]["lr"] == ppo.optimizer.param_groups[0]["lr"] < 1e-2
     assert kept.optimizer.param_groups[0]["lr"] == 1e-2
+
+
+def test_what_makes_the_condition_waits_for_the_policy(generator: torch.Generator) -> None:
+    for alone in (0, 1):
+        config = PPOConfig(hidden=(8,), style_hidden=(8,), minibatch=20, epochs=1, critic_first=alone)
+        made = torch.nn.Parameter(torch.ones(4))
+        ppo = PPO(ActorCritic(3, 2, 4, config, generator), config, [made])
+        batch = Rollout(5, 10)
+        for t in range(5):
+            state = torch.randn(10, 3, generator=generator)
+            action, log_prob = ppo.model.act(state, made.expand(10, 4), ActionNoise(generator))
+            batch.store(t, {"state": state, "action": action, "log_prob": log_prob})
+        batch["advantage"] = batch["return"] = torch.randn(5, 10, generator=generator)
+        ppo.update(batch, generator, condition=lambda rows: made.expand(len(rows["state"]), 4))  # noqa: B023
+        assert torch.equal(made, torch.ones(4)) == bool(alone)
+
+
+def test_the_critic_may_begin_alone(generator: torch.Generator) -> None:
+    ppo = make(critic_first=2, lead_kl=0.1, std_learning_rate=0.1)
+    policies, errors = [], []
+    for _ in range(4):
+        policies.append({name: weight.clone() for name, weight in ppo.model.policy.state_dict().items()})
+        batch = rollout(ppo, generator)
+        errors.append((ppo.model.value(batch["state"], None) - batch["return"]).square().mean().item())
+        stats = ppo.update(batch, generator)
+        assert (stats["policy_rate"] == 0.0) == (len(policies) <= 2)
+    assert all(torch.equal(policies[2][name], weight) for name, weight in policies[0].items())
+    assert any(not torch.equal(policies[3][name], weight) for name, weight in policies[0].items())
+    assert errors[2] < errors[0]
