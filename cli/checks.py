@@ -51,7 +51,6 @@ def _check_followed(config: TrainConfig) -> None:
     weight = config.runner.reward_weights.get("tracking", 0.0)
     uses = {"runner.reward_weights.tracking": weight, "guided_start.rounds": config.guided_start.rounds}
     uses["agent.assistance.tracking"] = getattr(getattr(config.agent, "assistance", None), "tracking", 0.0)
-    uses["agent.guide_weight"] = getattr(config.agent, "guide_weight", 0.0)
     used = [f"{name}={value:g}" for name, value in uses.items() if value]
     if used and not config.env.tracking.follow:
         raise CommandError(f"{used[0]}: nobody follows a clip; set env.tracking.follow=true")

@@ -48,7 +48,6 @@ class HumanoidVectorEnv(VectorEnv):
         heights: [N, 35, 35] float32, the ground about the root (only on uneven ground; `Terrain.map`).
         skill: [N] int64, the commanded label, an index into `skills`; random and independent of the start, but for the
             share `starts.commanded` of the starts in a clip.
-        guide: [N, A] float32, the action that leads along the clip from whatever state (only with `tracking.follow`).
         window: [N, W, 120] float32, the last W states, oldest first (only if `window` > 1); [N, W, 7 B] of links. After
             a reference start its past is the clip's own, after other starts the first state repeated.
 
@@ -271,6 +270,17 @@ class HumanoidVectorEnv(VectorEnv):
         """The current observation, which a `set_skill` since the last step has changed."""
         return self._shown(self._observation())
 
+    @at_home
+    def guide(self) -> Any:
+        """The actions [N, A] that lead along the clips from here, for learners; see `Guide`.
+
+        Raises:
+            SuiteError: nobody follows a clip.
+        """
+        if self._guide is None:
+            raise SuiteError("tracking.follow=false: there is no guide where no clip is followed")
+        return self._shown(self._guide.action(self.state, self._observer.ground))
+
     # --- checkpoints -------------------------------------------------------------------------------------------------
 
     @at_home
@@ -316,8 +326,6 @@ class HumanoidVectorEnv(VectorEnv):
         if self.task.goal_dim:
             observations["goal"] = box((self.task.goal_dim,))
         self._action_dim = self.character.action_dim + self.residual_dim
-        if self.config.tracking.follow:
-            observations["guide"] = box((self._action_dim,))
         self.single_observation_space = gymnasium.spaces.Dict(observations)
         self.single_action_space = gymnasium.spaces.Box(-1.0, 1.0, (self._action_dim,), np.float32)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
@@ -385,8 +393,6 @@ class HumanoidVectorEnv(VectorEnv):
         observation = {**self._observer.observation(self._steps), "skill": self._skills.current.clone()}
         if self.task.goal_dim:
             observation["goal"] = self.task.goal(self.state)
-        if self._guide is not None:
-            observation["guide"] = self._guide.action(self.state, self._observer.ground)
         return observation
 
     def _shown(self, result: Any) -> Any:

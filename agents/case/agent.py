@@ -3,7 +3,6 @@
 from typing import Any
 
 import torch
-from gymnasium import spaces
 from gymnasium.vector import VectorEnv
 from torch import Tensor
 
@@ -16,7 +15,6 @@ from murmillo.agents.common.blending import Blending
 from murmillo.agents.common.dimensions import dimensions, skill_count
 from murmillo.agents.common.discriminator import Discriminator, Windows
 from murmillo.agents.common.discriminator_loss import discriminator_loss
-from murmillo.agents.common.errors import AgentError
 from murmillo.agents.common.exploration import ActionNoise
 from murmillo.agents.common.interface import Demonstrations, Obs, Step
 from murmillo.agents.common.latents import LatentSequence, sample_sphere
@@ -78,10 +76,7 @@ class CASE(Blending):
         self.label = LabelEmbedding(labels, config.label_dim, generator)
         told_dim = config.latent_dim + config.label_dim
         self.model = SkillModel(env, state_dim, action_dim, told_dim, config, generator, base)
-        observed = env.single_observation_space
-        guided = config.guide_weight > 0 and isinstance(observed, spaces.Dict) and "guide" in observed.spaces
-        self._guide = ("guide",) if guided else ()
-        self.needs = self.model.needs.union(self._guide)
+        self.needs = self.model.needs
         self.ppo = PPO(self.model, config.ppo, self.label.parameters())
         self.noise = ActionNoise(generator, config.ppo.noise_correlation, ranks)
         heads = SkillHeads(labels)
@@ -165,11 +160,6 @@ class CASE(Blending):
     def update(self, rollout: Rollout) -> dict[str, float]:
         """Learn D by eq. 1 and q by eq. 2, pi and V by eq. 3, and what to practise by eq. 4."""
         self._check_learning()
-        if self.config.guide_weight and not self._guide:
-            raise AgentError(
-                f"agent.guide_weight={self.config.guide_weight:g}: the environment shows no guide; "
-                "set env.tracking.follow=true"
-            )
         config, generator, means = self.config, self.generator, Means()
         windows, labels, latents = (rollout.flat(name) for name in ("next_window", "label", "latent"))
         k = config.discriminator.minibatch
@@ -194,11 +184,9 @@ class CASE(Blending):
         ppo = self.ppo.update(
             rollout,
             generator,
-            fields=("latent", "label", *self._guide, *self.model.seen),
+            fields=("latent", "label", *self.model.seen),
             condition=lambda batch: self.model.tell(self.condition(batch["latent"], batch["label"]), batch),
-            extra_loss=lambda batch, mean: (
-                self._diversity(batch, mean) | self._departure(batch, mean) | self.model.penalties(batch)
-            ),
+            extra_loss=lambda batch, mean: self._diversity(batch, mean) | self.model.penalties(batch),
         )
         demonstrations = self._draw_demonstrations()
         heads = self._practise(rollout, demonstrations)
@@ -279,13 +267,6 @@ class CASE(Blending):
 
     def _observe(self, demonstrations: Windows) -> None:
         self.discriminator.observe(demonstrations.window, demonstrations.mask)
-
-    def _departure(self, batch: Minibatch, parameters: Tensor) -> dict[str, Tensor]:
-        """What it costs to depart from the guide."""
-        if not self._guide:
-            return {}
-        departure = (self.model.policy.mode(parameters) - batch["guide"]).square().sum(-1).mean()
-        return {"guide": self.config.guide_weight * departure}
 
     def _diversity(self, batch: Minibatch, mean: Tensor) -> dict[str, Tensor]:
         """The last term of eq. 3: another z' for each sample's z, under the same label."""

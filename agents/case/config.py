@@ -38,8 +38,6 @@ class CASEConfig(SkillConfig):
         focal_rate: alpha of eq. 4.
         focal_start: iterations before the sampling leaves the uniform.
         focal_floor: least probability of a skill, as a share of the uniform (released code).
-        guide_weight: of the squared distance of the policy's mean from what leads along the clip (the observation
-            "guide"), throughout training; it keeps the labels that a guided start has taught.
         assistance: how residual forces fade.
         upright_iterations: first iterations in which only the feet may touch the ground; 0 for no such curriculum.
         discriminator: its dropout is the element-wise feature masking.
@@ -59,7 +57,6 @@ class CASEConfig(SkillConfig):
     focal_rate: float = 0.2
     focal_start: int = 2500
     focal_floor: float = 0.01
-    guide_weight: float = 0.0
     upright_iterations: int = 15_000
     assistance: AssistanceConfig = field(default_factory=AssistanceConfig)
     ppo: PPOConfig = field(default_factory=lambda: PPOConfig(style_hidden=()))
@@ -76,4 +73,4 @@ class CASEConfig(SkillConfig):
             if not 0 < getattr(self, name) <= 1:
                 raise AgentError(f"agent.{name}={getattr(self, name)}: needs a share above 0, at most 1")
         check_above_zero(self, "agent", "kappa")
-        check_at_least(0, self, "agent", "diversity_weight", "guide_weight", "focal_start", "upright_iterations")
+        check_at_least(0, self, "agent", "diversity_weight", "focal_start", "upright_iterations")

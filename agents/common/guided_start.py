@@ -3,9 +3,9 @@
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Any, Protocol
 
 import torch
-from gymnasium.vector import VectorEnv
 from torch import Tensor
 
 from murmillo.agents.common.exploration import ActionNoise
@@ -44,6 +44,19 @@ class GuidedStartConfig:
         check_at_least(1, self, "guided_start", "steps", "updates", "minibatch")
 
 
+class Guided(Protocol):
+    """A vector environment that knows what leads along the clips."""
+
+    num_envs: int
+
+    def reset(self, *, seed: int | None = None) -> tuple[Any, Any]: ...
+
+    def step(self, actions: Any) -> tuple[Any, Any, Any, Any, Any]: ...
+
+    def guide(self) -> Any:
+        """Actions `[N, A]`, whatever the states."""
+
+
 @dataclass(frozen=True)
 class Round:
     """
@@ -59,7 +72,7 @@ class Round:
 
 def guided_start(
     model: ActorCritic,
-    env: VectorEnv,
+    env: Guided,
     config: GuidedStartConfig,
     generator: torch.Generator,
     condition: Callable[[Tensor], Told] = lambda skill: None,
@@ -72,7 +85,7 @@ def guided_start(
 
     Args:
         model: whose policy is fitted; its normaliser learns too, its critic does not.
-        env: its observations have "state" `[N, S]`, "skill" `[N]` and "guide" `[N, A]`.
+        env: its observations have "state" `[N, S]` and "skill" `[N]`, and its `guide()` gives actions `[N, A]`.
         config: how long and how fast.
         generator: draws noise, minibatches and the environment's seed.
         condition: draws what the policy is told of states with these labels `[n]`.
@@ -89,7 +102,7 @@ def guided_start(
         own = torch.rand(env.num_envs, generator=generator) < (_OWN if number else 0.0)
         judged, ends = own if number else ~own, 0
         for _ in range(config.steps):
-            guide = obs["guide"]
+            guide = torch.as_tensor(env.guide())
             for kept, seen in ((states, obs["state"]), (skills, obs["skill"]), (guides, guide)):
                 kept.append(seen.clone())
             with torch.no_grad():

@@ -4,7 +4,6 @@ import math
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
 import pytest
 import torch
 from gymnasium import spaces
@@ -14,7 +13,7 @@ from murmillo.agents.case.agent import CASE
 from murmillo.agents.case.networks import LabelEmbedding
 from murmillo.agents.common.errors import AgentError
 from murmillo.agents.common.rollout import tensors
-from murmillo.agents.common.runner import Runner, RunnerConfig
+from murmillo.agents.common.runner import Runner
 from murmillo.agents.common.warm_start import WarmStartConfig, warm_start
 from tests.agents.toy import PointMass, make_case, make_runner, small_case
 
@@ -215,36 +214,3 @@ def test_a_warm_start_hears_the_labels(generator: torch.Generator) -> None:
     label = torch.arange(40) % 2
     done, _ = agent.model.act(torch.randn(40, 4, generator=generator), agent.draw_condition(label))
     torch.testing.assert_close(done, actions[label], atol=0.2, rtol=0)
-
-
-class Led(PointMass):
-    """The same with a guide that says one thing under each label."""
-
-    def __init__(self, num_envs: int, skills: int) -> None:
-        super().__init__(num_envs, skills=skills)
-        self.single_observation_space["guide"] = self.single_action_space  # type: ignore[index]  it is a dict
-
-    def _obs(self) -> dict[str, np.ndarray]:
-        return {**super()._obs(), "guide": LED[self.skill]}
-
-
-LED = np.array([[0.5, -0.3], [-0.4, 0.2]], np.float32)
-
-
-@pytest.mark.parametrize("weight", [0.0, 100.0])
-def test_by_its_weight_the_policy_keeps_to_the_guide(tmp_path: Path, weight: float) -> None:
-    generator = torch.Generator().manual_seed(0)
-    env = Led(32, skills=2)
-    agent = make_case(env, generator, guide_weight=weight)
-    config = RunnerConfig(samples=32 * 8 * 20, horizon=8, lam=0.9, gamma=0.9)
-    Runner(env, agent, config, generator, tmp_path).run()
-    label = torch.arange(64) % 2
-    done, _ = agent.model.act(torch.randn(64, 4, generator=generator) * 0.3, agent.draw_condition(label))
-    apart = (done - torch.from_numpy(LED)[label]).abs().mean().item()
-    assert (apart < 0.1) == (weight > 0)
-
-
-def test_without_a_guide_nothing_can_keep_to_it(tmp_path: Path) -> None:
-    runner = make_runner(tmp_path, make=make_case, skills=2, agent={"guide_weight": 5.0})
-    with pytest.raises(AgentError, match=r"agent\.guide_weight=5: the environment shows no guide; set env\.tracking"):
-        runner.run()

@@ -41,7 +41,7 @@ class Slope(VectorEnv):
         return (GOALS[self.skill] - self.place).clamp(-1.0, 1.0)
 
     def _seen(self) -> dict[str, torch.Tensor]:
-        return {"state": self.place.clone(), "skill": self.skill, "guide": self.guide()}
+        return {"state": self.place.clone(), "skill": self.skill}
 
 
 def make(generator: torch.Generator) -> ActorCritic:

@@ -196,12 +196,12 @@ def test_the_guide_leads_the_pd_control_along_the_clip():
     behind = []
     for lead in (True, False):
         env = make(60, starts=UPRIGHT, tracking={"follow": True, "switch": 0.0, "lost": 9.0})
-        obs, _ = env.reset(seed=1)
+        env.reset(seed=1)
         assert env._tracker is not None
         begun, error = env._tracker.state_dict(), []
         for step in range(1, 13):
             now = env.library.pose(begun["clip"], begun["time"] + step * CONTROL_DT)[0]
-            obs = env.step(obs["guide"] if lead else env.character.action_for(now).numpy())[0]
+            env.step(env.guide() if lead else env.character.action_for(now).numpy())
             there = env.character.joint_coordinates(now)
             error.append((env.character.joint_coordinates(env.state.qpos) - there).abs().mean().item())
         behind.append(sum(error))
@@ -214,10 +214,10 @@ def test_with_residual_forces_the_guide_keeps_balance():
         env = make(
             30, starts=UPRIGHT, tracking={"follow": True, "lost": 9.0}, residual_force=newtons, autoreset="same_step"
         )
-        obs, _ = env.reset(seed=1)
+        env.reset(seed=1)
         standing = np.ones(30, bool)
         for _ in range(150):
-            obs, _, terminated, _, _ = env.step(obs["guide"])
+            _, _, terminated, _, _ = env.step(env.guide())
             standing &= ~terminated
         lengths.append(standing.mean())
     assert lengths[0] < 0.5
@@ -226,18 +226,18 @@ def test_with_residual_forces_the_guide_keeps_balance():
 
 def test_the_guide_pulls_each_body_to_where_the_clip_has_it():
     env = make(3, starts=UPRIGHT, tracking={"follow": True}, residual_force=1e4)
-    obs, _ = env.reset(seed=4)
-    rest = obs["guide"][:, 31:]
+    env.reset(seed=4)
+    rest = env.guide()[:, 31:]
     qpos, qvel = env.state.qpos.clone(), env.state.qvel.clone()
     qpos[:, 2] += 0.1
     env.physics.write(torch.arange(3), qpos, qvel)
-    pulled = (env.observation()["guide"][:, 31:] - rest).reshape(3, 15, 3)
+    pulled = (env.guide()[:, 31:] - rest).reshape(3, 15, 3)
     np.testing.assert_allclose(pulled[..., 2], -0.01, atol=1e-6)  # 1,000 N/m over 0.1 m, of 10,000 N
     np.testing.assert_allclose(pulled[..., :2], 0.0, atol=1e-6)
     qpos[:, 2] -= 0.1
     qvel[:, 2] += 1.0
     env.physics.write(torch.arange(3), qpos, qvel)
-    slowed = (env.observation()["guide"][:, 31:] - rest).reshape(3, 15, 3)
+    slowed = (env.guide()[:, 31:] - rest).reshape(3, 15, 3)
     np.testing.assert_allclose(slowed[..., 2], -0.01, atol=1e-6)  # 100 N s/m
     qpos, qvel = env.state.qpos.clone(), env.state.qvel.clone()
     turn = torch.tensor([np.cos(0.5), 0.0, 0.0, np.sin(0.5)])
@@ -249,7 +249,7 @@ def test_the_guide_pulls_each_body_to_where_the_clip_has_it():
     qvel[:, 0], qvel[:, 1] = cosine * x - sine * y, sine * x + cosine * y
     qpos[:, :2] += 3.0
     env.physics.write(torch.arange(3), qpos, qvel)
-    moved = env.observation()["guide"][:, 31:].reshape(3, 15, 3)
+    moved = env.guide()[:, 31:].reshape(3, 15, 3)
     np.testing.assert_allclose(moved, (slowed + rest.reshape(3, 15, 3)), atol=2e-6)  # neither place nor heading counts
 
 
@@ -272,9 +272,10 @@ def test_the_environment_pays_for_following_and_ends_what_is_lost():
 def test_nothing_is_followed_unless_asked_for():
     env = make(2)
     env.reset(seed=0)
-    obs, _, _, _, info = env.step(np.zeros((2, 31), np.float32))
+    info = env.step(np.zeros((2, 31), np.float32))[-1]
     assert "side_rewards" not in info
-    assert "guide" not in obs
+    with pytest.raises(SuiteError, match=r"tracking.follow=false: there is no guide where no clip is followed"):
+        env.guide()
 
 
 def test_following_goes_on_from_a_saved_state_bit_for_bit(generator):
