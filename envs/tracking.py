@@ -38,6 +38,7 @@ class TrackingConfig:
         lost: an episode ends, as by a fall, where the key points are further than this from the clip's on average [m].
         near: within this of a clip's first pose, by the same measure, the clip begins [m].
         patience: time in which to come there from the middle of another skill [s]; then the clip begins all the same.
+            A clip that has begun waits no longer either: whoever makes it has lost it.
         switch: probability that another skill is commanded where a clip ends; else it begins again.
     """
 
@@ -80,6 +81,8 @@ class Tracker:
         self._parts = state_parts(character.base)
         self._clip = torch.zeros(num_envs, dtype=torch.int64)
         self._time = torch.zeros(num_envs, dtype=torch.float64)
+        self._held = torch.zeros(num_envs, dtype=torch.float64)
+        """[N] [s] for which clips that have begun have waited of late."""
         self._character = character
         spans = [self._span(clip) for clip in range(len(library.clips))]
         self._first, self._last, self._again = torch.tensor(spans, dtype=torch.float64).unbind(-1)
@@ -87,12 +90,13 @@ class Tracker:
     def begin(self, env_ids: Tensor, clip: Tensor, time: Tensor) -> None:
         """These worlds are at `time` [n] [s] of `clip` [n], or at the next moment of it that is no rest."""
         latest = self._last[clip] - CONTROL_DT
+        self._held[env_ids] = 0.0
         self._clip[env_ids], self._time[env_ids] = clip, torch.minimum(torch.maximum(time, self._first[clip]), latest)
 
     def turn(self, env_ids: Tensor, generator: torch.Generator) -> None:
         """These worlds [n] are to come to the beginning of a clip of their skill, wherever they are."""
         self._clip[env_ids], _ = self._library.sample(len(env_ids), generator, self._skills.current[env_ids])
-        self._time[env_ids] = -self._config.patience
+        self._time[env_ids], self._held[env_ids] = -self._config.patience, 0.0
 
     def step(self, state: Tensor, generator: torch.Generator) -> tuple[Tensor, Tensor]:
         """One control step further; what the worlds do and are commanded next.
@@ -113,7 +117,9 @@ class Tracker:
         self._time, squares, distance = self._nearest(state, begun)
         reward = (torch.tensor([[0.4], [0.2], [0.2], [0.2]]) * _likeness(squares)).sum(0)
         reward = torch.where(self._time > before, reward, _WAITED * reward)
-        lost = (distance > self._config.lost) & (self._time > first + _SETTLED)
+        held = torch.where(self._time > before, -CONTROL_DT, CONTROL_DT)
+        self._held = torch.where(begun, (self._held + held).clamp_min(0.0), 0.0)
+        lost = (distance > self._config.lost) & (self._time > first + _SETTLED) | (self._held > self._config.patience)
         there = (self._time < first) & ((distance < self._config.near) | (self._time >= 0.0))
         self._time = torch.where(there, first, self._time)
         self._end(generator)
@@ -175,10 +181,10 @@ class Tracker:
         return torch.stack(_squares(states - other, self._parts)).sum(0)
 
     def state_dict(self) -> dict[str, Tensor]:
-        return {"clip": self._clip.clone(), "time": self._time.clone()}
+        return {"clip": self._clip.clone(), "time": self._time.clone(), "held": self._held.clone()}
 
     def load_state_dict(self, state: dict[str, Tensor]) -> None:
-        self._clip, self._time = state["clip"].clone(), state["time"].clone()
+        self._clip, self._time, self._held = (state[name].clone() for name in ("clip", "time", "held"))
 
 
 def _squares(error: Tensor, parts: StateParts) -> tuple[Tensor, Tensor, Tensor, Tensor]:

@@ -110,6 +110,21 @@ def test_a_clip_waits_for_who_is_behind_and_pays_less(character, library, genera
     assert late.item() == pytest.approx(1.0, abs=1e-3)  # that goes on, twenty steps late
 
 
+def test_who_makes_a_clip_wait_for_too_long_has_lost_it(character, library, generator):
+    follower, _ = tracker(character, library, [KICK, KICK], patience=0.5)
+    follower.begin(torch.arange(2), torch.tensor([KICK, KICK]), torch.full((2,), 0.5, dtype=torch.float64))
+    stays, lost = at(library, KICK, 0.5), []
+    for step in range(40):
+        if step == 10:  # the second goes on for a while, which is counted
+            for more in range(1, 6):
+                follower.step(torch.cat((stays, at(library, KICK, 0.6 + more * CONTROL_DT))), generator)
+        time = follower.state_dict()["time"][1].item()
+        lost.append(follower.step(torch.cat((stays, at(library, KICK, time))), generator)[1])
+    first, second = torch.stack(lost).long().argmax(0).tolist()
+    assert first * CONTROL_DT < 0.6
+    assert second > first
+
+
 def test_a_clip_hurries_after_who_is_ahead(character, library, generator):
     follower, _ = tracker(character, library, [KICK])
     follower.begin(torch.tensor([0]), torch.tensor([KICK]), torch.tensor([0.5], dtype=torch.float64))
