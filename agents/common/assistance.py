@@ -15,8 +15,8 @@ _MEMORY = 0.9
 _TRACKING = "tracking"
 """The reward of `env.tracking`."""
 
-_LEAST = 0.01
-"""What is then left of the forces goes at once, so that in the end there are none."""
+_GONE = 0.01
+"""What is left of the forces then goes at once, so that in the end there are none."""
 
 
 @dataclass
@@ -27,19 +27,23 @@ class AssistanceConfig:
         fade: share of what is left of them that goes in an iteration; 0 leaves them as they are.
         falls: share of the steps that may end in a fall; while more do, nothing goes.
         tracking: mean reward for following the clips below which nothing goes; 0 asks for none.
+        least: share of them that stays for good.
         from_iteration: iterations before anything does.
     """
 
     fade: float = 0.0
     falls: float = 0.001
     tracking: float = 0.0
+    least: float = 0.0
     from_iteration: int = 50
 
     def __post_init__(self) -> None:
-        check_at_least(0, self, "agent.assistance", "fade", "tracking", "from_iteration")
+        check_at_least(0, self, "agent.assistance", "fade", "tracking", "least", "from_iteration")
         check_above_zero(self, "agent.assistance", "falls")
         if self.fade >= 1:
             raise AgentError(f"agent.assistance.fade={self.fade}: needs a share of less than 1")
+        if self.least > 1:
+            raise AgentError(f"agent.assistance.least={self.least}: needs a share, at most 1")
 
 
 class Assistance:
@@ -82,7 +86,8 @@ class Assistance:
             self._tracking = memory * self._tracking + (1 - memory) * _mean(rollout, _TRACKING)
         able = self._falls <= config.falls and self._tracking >= config.tracking
         if iteration >= config.from_iteration and able:
-            self._reach *= 1 - config.fade if self._reach[0] > _LEAST else 0.0
+            left = self._reach[0].item() * (1 - config.fade)
+            self._reach.fill_(max(left if left > _GONE else 0.0, config.least))
         return {"share": self._reach[0].item(), "falls": self._falls}
 
     def state_dict(self) -> dict[str, float]:

@@ -77,8 +77,14 @@ def test_where_nothing_is_followed_nothing_can_be_asked_of_it(generator: torch.G
 def test_the_last_hundredth_goes_at_once(generator: torch.Generator) -> None:
     model, assistance = make(generator)
     shares = [assistance.update(rollout(0), i)["share"] for i in range(9)]
-    assert shares[6:] == [0.5**7, 0.0, 0.0]
+    assert shares[5:] == [0.5**6, 0.0, 0.0, 0.0]
     assert (model.act(torch.randn(3, 4, generator=generator))[0][:, 1] == 0.0).all()
+
+
+def test_what_is_to_stay_stays(generator: torch.Generator) -> None:
+    _, assistance = make(generator, least=0.2)
+    shares = [assistance.update(rollout(0), i)["share"] for i in range(4)]
+    assert shares == pytest.approx([0.5, 0.25, 0.2, 0.2])
 
 
 def test_it_is_a_part_of_the_run(tmp_path: Path) -> None:
@@ -110,6 +116,7 @@ def test_without_such_forces_nothing_can_fade(generator: torch.Generator) -> Non
         ({"fade": -0.1}, r"agent.assistance.fade=-0.1"),
         ({"fade": 1.0}, r"agent.assistance.fade=1.0: needs a share of less than 1"),
         ({"tracking": -1.0}, r"agent.assistance.tracking=-1.0"),
+        ({"least": 1.5}, r"agent.assistance.least=1.5: needs a share, at most 1"),
         ({"falls": 0.0}, r"agent.assistance.falls=0.0"),
         ({"from_iteration": -1}, r"agent.assistance.from_iteration=-1"),
     ],
