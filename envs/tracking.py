@@ -114,7 +114,7 @@ class Tracker:
             self.turn(others, generator)
         first = self._first[self._clip]
         before, begun = self._time, self._time >= first - _ON_TIME
-        self._time, squares, distance = self._nearest(state, begun)
+        self._time, squares, distance = self._nearest(state)
         reward = (torch.tensor([[0.4], [0.2], [0.2], [0.2]]) * _likeness(squares)).sum(0)
         reward = torch.where(self._time > before, reward, _WAITED * reward)
         held = torch.where(self._time > before, -CONTROL_DT, CONTROL_DT)
@@ -131,8 +131,8 @@ class Tracker:
         later = torch.where(time > self._last[clip], self._again[clip] + time - self._last[clip], time)
         return self._library.pose(clip, torch.maximum(later, self._first[clip]))
 
-    def _nearest(self, state: Tensor, begun: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """A control step on, at the pace that keeps the clip nearest to the character, where it has begun [N] bool.
+    def _nearest(self, state: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """A control step on, at the pace that keeps the clip nearest to the character.
 
         A policy sees no clock: were the clip's to run on, one that is late would never be right again.
 
@@ -148,7 +148,7 @@ class Tracker:
         squares = torch.stack(_squares(error, self._parts))
         distance = error[..., self._parts.keys].unflatten(-1, (-1, 3)).norm(dim=-1).mean(-1)
         apart = squares.sum(0)
-        apart[0] = torch.where(begun, _NEARER * apart[0], -1.0)
+        apart[0] *= _NEARER
         chosen, worlds = apart.argmin(0), torch.arange(len(state))
         return times[chosen, worlds], squares[:, chosen, worlds], distance[chosen, worlds]
 

@@ -125,6 +125,22 @@ def test_who_makes_a_clip_wait_for_too_long_has_lost_it(character, library, gene
     assert second > first
 
 
+def test_how_long_a_clip_has_waited_is_a_part_of_the_state(character, library, generator):
+    stays, states = at(library, KICK, 0.5), []
+    for saved in (None, 10):
+        follower, _ = tracker(character, library, [KICK], patience=0.5)
+        follower.begin(torch.tensor([0]), torch.tensor([KICK]), torch.tensor([0.5], dtype=torch.float64))
+        for step in range(14):
+            if step == saved:
+                state = follower.state_dict()
+                follower, _ = tracker(character, library, [KICK], patience=0.5)
+                follower.load_state_dict(state)
+            follower.step(stays, generator)
+        states.append(follower.state_dict())
+    assert states[0]["held"] > 0.3
+    assert all(torch.equal(states[0][name], states[1][name]) for name in states[0])
+
+
 def test_a_clip_hurries_after_who_is_ahead(character, library, generator):
     follower, _ = tracker(character, library, [KICK])
     follower.begin(torch.tensor([0]), torch.tensor([KICK]), torch.tensor([0.5], dtype=torch.float64))
@@ -268,6 +284,18 @@ def test_the_guide_pulls_each_body_to_where_the_clip_has_it():
     np.testing.assert_allclose(moved, (slowed + rest.reshape(3, 15, 3)), atol=2e-6)  # neither place nor heading counts
 
 
+def test_the_guide_stands_on_the_ground_that_there_is():
+    env = make(3, starts=UPRIGHT, tracking={"follow": True}, residual_force=1e4)
+    env.reset(seed=4)
+    assert env._guide is not None
+    level = env._guide.action(env.state)
+    qpos = env.state.qpos.clone()
+    qpos[:, 2] += 0.1
+    env.physics.write(torch.arange(3), qpos, env.state.qvel.clone())
+    raised = env._guide.action(env.state, torch.full((3,), 0.1, dtype=torch.float64))
+    torch.testing.assert_close(raised, level, atol=1e-5, rtol=0)
+
+
 def test_the_environment_pays_for_following_and_ends_what_is_lost():
     env = make(30, starts=UPRIGHT, tracking={"follow": True, "lost": 0.5})
     obs, _ = env.reset(seed=0)
@@ -300,14 +328,14 @@ def test_following_goes_on_from_a_saved_state_bit_for_bit(generator):
     for saved in (False, True):
         env = make(12, starts=starts, tracking={"follow": True}, episode_steps=40)
         env.reset(seed=3)
-        for action in actions[:40]:
+        for action in actions[:30]:
             env.step(action.numpy())
         if saved:
             state = env.state_dict()
             env = make(12, starts=starts, tracking={"follow": True}, episode_steps=40)
             env.reset(seed=9)
             env.load_state_dict(state)
-        steps = [env.step(action.numpy()) for action in actions[40:]]
+        steps = [env.step(action.numpy()) for action in actions[30:]]
         runs.append([(obs["skill"], info["side_rewards"]["tracking"], end) for obs, _, end, _, info in steps])
     for plain, resumed in zip(*runs, strict=True):
         for a, b in zip(plain, resumed, strict=True):
