@@ -14,7 +14,6 @@ _MEMORY = 0.9
 """Of falls and rewards, from one iteration to the next."""
 _TRACKING = "tracking"
 """The reward of `env.tracking`."""
-
 _GONE = 0.01
 """What is left of the forces then goes at once, so that in the end there are none."""
 
@@ -66,7 +65,8 @@ class Assistance:
         columns = int(getattr(env, "residual_dim", 0))
         if config.fade and not columns:
             raise AgentError(
-                f"agent.assistance.fade={config.fade}: there are no residual forces; set env.residual_force=50"
+                f"agent.assistance.fade={config.fade}: there are no residual forces; "
+                "set env.residual_force=50, or this to 0"
             )
         own = config.fade > 0 and isinstance(model.policy, GaussianPolicy)
         self._reach = model.policy.reach[-columns:] if own else None

@@ -81,7 +81,8 @@ def guided_start(
 
     States of clips say nothing of those beside them, into which every policy comes after some steps. So the worlds are
     stepped, at first by the guide, then in most of them by the policy, always with noise, and the policy is regressed
-    on what would lead along the clip in all states that were seen. The guide keeps no balance; it says where to go.
+    on what would lead along the clip in all states that were seen. A guide without residual forces keeps no
+    balance; it says where to go.
 
     Args:
         model: whose policy is fitted; its normaliser learns too, its critic does not.
