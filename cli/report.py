@@ -207,7 +207,7 @@ def _ages(measures: dict[str, Any], adapted: bool) -> str:
         before, after = measures["untrained"]["length"], measures["warm_started"]["length"]
         text += [
             "",
-            "The warm start, a regression on the clips' own next poses before the first sample, changed the length of "
+            "The warm start, a regression on what leads along the clips before the first sample, changed the length of "
             f"an episode by {after - before:+.1f} steps.",
         ]
     if shares := [m["residual_share"] for m in measures.values() if m.get("residual_share") is not None]:
