@@ -61,6 +61,7 @@ def _run(name: str, words: list[str]) -> int:
     if "--help" in words or "-h" in words:
         print(module.HELP, end="")
         return 0
+    importlib.import_module("murmillo.envs")  # before torch and mujoco, whose threads and graphics it sees to
     return module.run(words)
 
 

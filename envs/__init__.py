@@ -3,7 +3,7 @@
 Importing it registers the ids; `gymnasium.make("murmillo.envs:murmillo/Imitation-v0")` does both in one go.
 """
 
-from murmillo.envs import _opengl  # noqa: F401  before anything that imports mujoco
+from murmillo.envs import _opengl, _openmp  # noqa: F401  before anything that imports mujoco or torch
 from murmillo.envs.config import EnvConfig
 from murmillo.envs.errors import MotionError, SuiteError
 from murmillo.envs.registration import register

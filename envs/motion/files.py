@@ -114,6 +114,11 @@ def _load_poselib(weights: dict[Path, float], character: Character) -> list[Clip
 def _read_dataset(file: Path) -> dict[Path, float]:
     """The clips that a dataset lists and their weights, which it must give."""
     weights = read_dataset(file)
+    if foreign := [clip.name for clip in weights if clip.suffix.lower() != ".npy"]:
+        raise MotionError(
+            f"{file}: lists {foreign[0][:80]!a}, which is no .npy clip; make clips of them with "
+            f"`murmillo motions import {file} --to FOLDER` and give that folder"
+        )
     for clip, weight in weights.items():
         if weight is None:
             raise MotionError(f"{file}: gives {clip.name[:80]!a} no weight; write a number above 0")

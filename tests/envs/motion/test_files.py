@@ -295,6 +295,13 @@ def test_a_bad_dataset_is_refused(poselib_folder, character, text):
     assert "\n" not in str(caught.value)
 
 
+def test_a_dataset_of_other_clips_names_the_importer(poselib_folder, character):
+    """AdaptNet's own lists, whose weights are null, are JSON files: what they lack is no weight."""
+    (poselib_folder / "walk.yaml").write_text("motions: [{file: one.npy, weight: 1}, {file: walk.json, weight: null}]")
+    with pytest.raises(MotionError, match=r"lists 'walk\.json', which is no \.npy clip; .*motions import .*walk\.yaml"):
+        load_clips(poselib_folder / "walk.yaml", character)
+
+
 def test_paths_without_clips(tmp_path, character):
     (tmp_path / "empty").mkdir()
     (tmp_path / "walk.bvh").write_text("HIERARCHY")
