@@ -1,8 +1,8 @@
 """Imports torch with threads that do not wait for work on the cores that MuJoCo's threads need.
 
 After each operation GNU's OpenMP, which torch has on Linux, keeps its threads spinning for some milliseconds. On two
-cores that is a fifth of an environment's step (docs/benchmarks.md). It reads how long they may when it is loaded, and only
-then; the variable is taken back afterwards, so that other processes of the user choose for themselves.
+cores that is a fifth of an environment's step (docs/benchmarks.md). It reads how long they may when it is loaded, and
+only then; the variable is taken back afterwards, so that other processes of the user choose for themselves.
 """
 
 import os

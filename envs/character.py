@@ -99,6 +99,10 @@ class Character:
         """Actions [..., A] to PD targets [..., A] [rad]; actions are clamped to [-1, 1]."""
         return self._offset.like(action) + self._scale.like(action) * action.clamp(-1.0, 1.0)
 
+    def action_of(self, targets: Tensor) -> Tensor:
+        """Actions [..., A] whose targets [rad] are these [..., A], clamped to [-1, 1]."""
+        return ((targets - self._offset.like(targets)) / self._scale.like(targets)).clamp(-1.0, 1.0)
+
     def joint_coordinates(self, qpos: Tensor) -> Tensor:
         """What the actuators measure in the pose qpos [..., nq]: exponential maps and angles [..., A] [rad]."""
         parts = [
@@ -109,8 +113,7 @@ class Character:
 
     def action_for(self, qpos: Tensor) -> Tensor:
         """The action [..., A] whose PD target is the pose qpos [..., nq], clamped to [-1, 1]."""
-        coordinates = self.joint_coordinates(qpos)
-        return ((coordinates - self._offset.like(qpos)) / self._scale.like(qpos)).clamp(-1.0, 1.0)
+        return self.action_of(self.joint_coordinates(qpos))
 
     def pose(self, coordinates: Tensor, root_pos_w: Tensor, root_quat_w: Tensor) -> Tensor:
         """Inverse of `joint_coordinates`: qpos [..., nq] of joints [..., A] [rad] and a root [..., 3] [m], [..., 4]."""

@@ -44,7 +44,11 @@ class OutsideForces:
         self._push_w = pushed if self._push_w is None else self._push_w + pushed
 
     def residual_action(self, force_h: Tensor) -> Tensor:
-        """The part [N, residual_dim] of an action whose forces are these of all bodies [N, B, 3] [N], heading frame."""
+        """The part [N, residual_dim] of an action whose forces are these of all bodies, heading frame.
+
+        Args:
+            force_h: [N, B, 3] in units of the greatest residual force.
+        """
         if self._residual is None:
             return force_h.new_zeros(len(force_h), 0)
         return self._residual.action_for(force_h)

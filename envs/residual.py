@@ -37,8 +37,8 @@ class ResidualForces:
         return force_w
 
     def action_for(self, force_h: Tensor) -> Tensor:
-        """The action [N, 45] whose forces are these of all bodies [N, B, 3] [N], heading frame, as far as it goes."""
-        return (force_h[:, self._bodies] / self.scale).clamp(-1.0, 1.0).flatten(1)
+        """The action [N, 45] of forces on all bodies [N, B, 3], in units of the scale and the heading frame."""
+        return force_h[:, self._bodies].clamp(-1.0, 1.0).flatten(1)
 
     def reward(self, action: Tensor) -> Tensor:
         """r_f [N], 1 without any force: exp(-sum_j |xi_j|), or with the mean over the joints in place of the sum.

@@ -256,20 +256,20 @@ def test_with_residual_forces_the_guide_keeps_balance():
 
 
 def test_the_guide_pulls_each_body_to_where_the_clip_has_it():
-    env = make(3, starts=UPRIGHT, tracking={"follow": True}, residual_force=1e4)
+    env = make(3, starts=UPRIGHT, tracking={"follow": True}, residual_force=50.0)
     env.reset(seed=4)
     rest = env.guide()[:, 31:]
     qpos, qvel = env.state.qpos.clone(), env.state.qvel.clone()
-    qpos[:, 2] += 0.1
+    qpos[:, 2] += 0.01
     env.physics.write(torch.arange(3), qpos, qvel)
     pulled = (env.guide()[:, 31:] - rest).reshape(3, 15, 3)
-    np.testing.assert_allclose(pulled[..., 2], -0.01, atol=1e-6)  # 1,000 N/m over 0.1 m, of 10,000 N
-    np.testing.assert_allclose(pulled[..., :2], 0.0, atol=1e-6)
-    qpos[:, 2] -= 0.1
-    qvel[:, 2] += 1.0
+    np.testing.assert_allclose(pulled[..., 2], -0.2, atol=1e-5)  # of 50 N: 1,000 N/m over 1 cm
+    np.testing.assert_allclose(pulled[..., :2], 0.0, atol=1e-5)
+    qpos[:, 2] -= 0.01
+    qvel[:, 2] += 0.1
     env.physics.write(torch.arange(3), qpos, qvel)
     slowed = (env.guide()[:, 31:] - rest).reshape(3, 15, 3)
-    np.testing.assert_allclose(slowed[..., 2], -0.01, atol=1e-6)  # 100 N s/m
+    np.testing.assert_allclose(slowed[..., 2], -0.2, atol=1e-5)  # 100 N s/m
     qpos, qvel = env.state.qpos.clone(), env.state.qvel.clone()
     turn = torch.tensor([np.cos(0.5), 0.0, 0.0, np.sin(0.5)])
     w, z = turn[0], turn[3]
@@ -281,19 +281,20 @@ def test_the_guide_pulls_each_body_to_where_the_clip_has_it():
     qpos[:, :2] += 3.0
     env.physics.write(torch.arange(3), qpos, qvel)
     moved = env.guide()[:, 31:].reshape(3, 15, 3)
-    np.testing.assert_allclose(moved, (slowed + rest.reshape(3, 15, 3)), atol=2e-6)  # neither place nor heading counts
+    np.testing.assert_allclose(moved, (slowed + rest.reshape(3, 15, 3)), atol=1e-4)  # neither place nor heading counts
 
 
 def test_the_guide_stands_on_the_ground_that_there_is():
-    env = make(3, starts=UPRIGHT, tracking={"follow": True}, residual_force=1e4)
+    """What the forces do; of the joints' targets see test_balance."""
+    env = make(3, starts=UPRIGHT, tracking={"follow": True}, residual_force=50.0)
     env.reset(seed=4)
     assert env._guide is not None
-    level = env._guide.action(env.state)
+    level = env._guide.action(env.state)[:, 31:]
     qpos = env.state.qpos.clone()
     qpos[:, 2] += 0.1
     env.physics.write(torch.arange(3), qpos, env.state.qvel.clone())
-    raised = env._guide.action(env.state, torch.full((3,), 0.1, dtype=torch.float64))
-    torch.testing.assert_close(raised, level, atol=1e-5, rtol=0)
+    raised = env._guide.action(env.state, torch.full((3,), 0.1, dtype=torch.float64))[:, 31:]
+    torch.testing.assert_close(raised, level, atol=1e-4, rtol=0)
 
 
 def test_the_environment_pays_for_following_and_ends_what_is_lost():
