@@ -50,7 +50,7 @@ def _check_followed(config: TrainConfig) -> None:
     """Refuse clips that are followed for nothing, and what needs them where none is followed."""
     weight = config.runner.reward_weights.get("tracking", 0.0)
     uses = {"runner.reward_weights.tracking": weight, "guided_start.rounds": config.guided_start.rounds}
-    uses["agent.assistance.tracking"] = getattr(getattr(config.agent, "assistance", None), "tracking", 0.0)
+    uses["agent.assistance.follows"] = getattr(getattr(config.agent, "assistance", None), "follows", 0.0)
     used = [f"{name}={value:g}" for name, value in uses.items() if value]
     if used and not config.env.tracking.follow:
         raise CommandError(f"{used[0]}: nobody follows a clip; set env.tracking.follow=true")

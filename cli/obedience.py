@@ -39,14 +39,19 @@ def _skills(skills: dict[str, dict[str, float]]) -> str:
     if not skills:
         return ""
     hardest_first = sorted(skills.items(), key=lambda item: -item[1]["share"])
-    rows = [f"| {name} | {100 * s['share']:.2f} % | {s['score']:.3f} |" for name, s in hardest_first]
+    helped = any("forces" in skill for skill in skills.values())
+    rows = [
+        f"| {name} | {100 * s['share']:.2f} % | {s['score']:.3f} |" + (f" {s['forces']:.2f} |" if helped else "")
+        for name, s in hardest_first
+    ]
     return "\n".join(
         [
             f"Focal sampling gives each skill a share of the practice; an even one is {100 / len(skills):.2f} %. The "
-            "score is the discriminator's mean for the agent's motion under this label being a clip of it.",
+            "score is the discriminator's mean for the agent's motion under this label being a clip of it."
+            + (" Forces: what is left of the residual ones that it began with." if helped else ""),
             "",
-            "| skill | share of the practice | score |",
-            "|---|---:|---:|",
+            "| skill | share of the practice | score |" + (" forces |" if helped else ""),
+            "|---|---:|---:|" + ("---:|" if helped else ""),
             *rows,
         ]
     )

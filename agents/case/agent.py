@@ -19,6 +19,7 @@ from murmillo.agents.common.exploration import ActionNoise
 from murmillo.agents.common.interface import Demonstrations, Obs, Step
 from murmillo.agents.common.latents import LatentSequence, sample_sphere
 from murmillo.agents.common.masks import FeatureMasks
+from murmillo.agents.common.networks import REACH, Told, by_name
 from murmillo.agents.common.ppo import PPO, Minibatch
 from murmillo.agents.common.ranks import ALONE, Part, Ranks
 from murmillo.agents.common.replay import Replay
@@ -86,18 +87,19 @@ class CASE(Blending):
         self.encoder = Encoder(
             config.window * state_dim, config.encoder_hidden, config.latent_dim, labels, config.label_dim, generator
         )
+        self.assistance = Assistance(labels, env, config.assistance, fades=base is None)
         self.eye = self.discriminator
         if base is not None:
             self.eye = Discriminator(config.window, state_dim, config.discriminator, generator, heads)
             take_over(self.eye, base, "discriminator")  # for the encoder, which sees windows in its units
             take_over(self.encoder, base, "encoder")
             take_over(self.label, base, "label")
+            take_over(self.assistance, base, "assistance")
         self.optimizer = adam(
             ([*self.discriminator.parameters(), *self.encoder.parameters()], config.discriminator.learning_rate)
         )
         self.replay = Replay(config.discriminator.replay_size, config.discriminator.replay_keep, ranks)
         self.focal = FocalSampling(labels, config)
-        self.assistance = Assistance(self.model, env, config.assistance)
         self.masks = FeatureMasks(demonstrations, labels)
         self.iterations = 0
         self._parts = {
@@ -118,7 +120,7 @@ class CASE(Blending):
     def act(self, obs: Obs, *, deterministic: bool = False) -> Step:
         """One step under the labels that are commanded now and the sequence of latents."""
         latent, label = self.latents.step(), obs["skill"]
-        told = self.model.told(self.condition(latent, label), obs)
+        told = self._helped(self.model.told(self.condition(latent, label), obs), label)
         action, log_prob = self.model.act(obs["state"], told, None if deterministic else self.noise)
         return Step(action, log_prob, {"latent": latent, "label": label})
 
@@ -185,7 +187,7 @@ class CASE(Blending):
             rollout,
             generator,
             fields=("latent", "label", *self.model.seen),
-            condition=lambda batch: self.model.tell(self.condition(batch["latent"], batch["label"]), batch),
+            condition=self._tell,
             extra_loss=lambda batch, mean: self._diversity(batch, mean) | self.model.penalties(batch),
         )
         demonstrations = self._draw_demonstrations()
@@ -215,8 +217,9 @@ class CASE(Blending):
         return self.condition(self.draw_latents(len(label)), label).detach()
 
     def skill_tables(self) -> dict[str, Tensor]:
-        """Share of each skill in the practice, and the discriminator's mean score of it."""
-        return {"share": self.focal.probability, "score": self.focal.score}
+        """Share of each skill in the practice, the discriminator's mean score of it, what it has left of forces."""
+        tables = {"share": self.focal.probability, "score": self.focal.score}
+        return tables | {"forces": self.assistance.share} if self.assistance.helps else tables
 
     @torch.no_grad()
     def head_scores(self, rollout: Rollout) -> dict[str, Tensor]:
@@ -265,6 +268,16 @@ class CASE(Blending):
         drawn = part.drawn(self.demonstrations, self.generator, skill=skill)
         return Windows(drawn["window"], drawn["skill"], drawn.get("mask"), part)
 
+    def _tell(self, batch: Minibatch) -> Told:
+        """What policy and critic were told of a minibatch."""
+        condition = self.condition(batch["latent"], batch["label"])
+        return self._helped(self.model.tell(condition, batch), batch["label"])
+
+    def _helped(self, told: Told, label: Tensor) -> Told:
+        """The same, and how far the forces from outside reach under these labels `[...]`."""
+        reach = self.assistance.reach(label)
+        return told if reach is None else {**by_name(told), REACH: reach}
+
     def _observe(self, demonstrations: Windows) -> None:
         self.discriminator.observe(demonstrations.window, demonstrations.mask)
 
@@ -274,7 +287,7 @@ class CASE(Blending):
         if config.diversity == "none":
             return {}
         z = batch.part.of(sample_sphere(batch.part.total, config.latent_dim, self.generator))
-        other = self.model.told(self.condition(z, batch["label"]), batch)
+        other = self._helped(self.model.told(self.condition(z, batch["label"]), batch), batch["label"])
         other_mean = self.model.policy(batch["state"], other)
         std = self.model.policy.moments(mean)[1].detach().exp()
         loss = diversity_loss(mean, other_mean, batch["latent"], z, std, config.diversity)

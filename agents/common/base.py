@@ -31,7 +31,7 @@ _WITHIN = (f"{_POLICY}base.", f"{_NORMALIZER}normalizers.0.")
 """Where an adapted policy has the two."""
 _PLAIN = f"{_POLICY}plain."
 """Where a merged one has the policy of the base's kind."""
-_PER_ACTION = ("head.weight", "head.bias", "spread.weight", "spread.bias", "log_std", "reach")
+_PER_ACTION = ("head.weight", "head.bias", "spread.weight", "spread.bias", "log_std")
 """The tensors with a row for each action."""
 
 

@@ -94,6 +94,9 @@ def style_mlp(latent_dim: int, hidden: Sequence[int], generator: torch.Generator
 CONDITION = "condition"
 """The name of the condition where policy and critic are told several things."""
 
+REACH = "reach"
+"""The name of how far a policy's means reach, where they are scaled."""
+
 Told = Tensor | Mapping[str, Tensor] | None
 """What policy and critic are told beside the state: a condition `[..., C]`, several things by name, or nothing."""
 
@@ -119,12 +122,14 @@ class Policy(nn.Module):
     """From the last hidden layer to the mean."""
     log_std: Tensor
     """`[A]`, where it depends on no state."""
-    reach: Tensor
-    """`[A]`, what is left of the mean of each number of an action where some of them fade (`Assistance`)."""
 
     def forward(self, state: Tensor, told: Told = None) -> Tensor:
-        """Parameters `[..., P]` of the actions in normalised states `[..., D]`, under what the policy is told."""
-        return self.read(self.features(state, told))
+        """Parameters `[..., P]` of the actions in normalised states `[..., D]`, under what the policy is told.
+
+        That may be how far the means reach, `REACH` `[..., A]`, where they are all the parameters.
+        """
+        parameters, reach = self.read(self.features(state, told)), by_name(told).get(REACH)
+        return parameters if reach is None else parameters * reach
 
     def features(self, state: Tensor, told: Told = None) -> Tensor:
         """The last hidden layer `[..., H]`."""
@@ -144,7 +149,7 @@ class Policy(nn.Module):
 
     def moments(self, parameters: Tensor) -> tuple[Tensor, Tensor]:
         """Mean `[..., A]` and logarithm of the standard deviation, `[..., A]` or `[A]`."""
-        return parameters * self.reach, self.log_std
+        return parameters, self.log_std
 
     def sample(self, parameters: Tensor, noise: ActionNoise) -> Tensor:
         """Actions `[N, A]` drawn from the distributions with these parameters `[N, P]`."""
@@ -204,7 +209,6 @@ class GaussianPolicy(Policy):
         self.head = linear(hidden[-1], action_dim, generator)
         with torch.no_grad():
             self.head.weight *= mean_init_scale
-        self.register_buffer("reach", torch.ones(action_dim))
         log_std = torch.full((action_dim,), std).log()
         if learn_std:
             self.log_std = nn.Parameter(log_std)
@@ -242,7 +246,8 @@ class Critic(nn.Sequential):
     def __init__(self, state_dim: int, condition_dim: int, hidden: Sequence[int], generator: torch.Generator) -> None:
         super().__init__(mlp([state_dim + condition_dim, *hidden], generator), linear(hidden[-1], 1, generator))
 
-    def forward(self, state: Tensor, condition: Tensor | None = None) -> Tensor:
-        """`[...]` from normalised states `[..., D]` and conditions `[..., C]`."""
+    def forward(self, state: Tensor, told: Told = None) -> Tensor:
+        """`[...]` from normalised states `[..., D]` and the condition `[..., C]` that it is told."""
+        condition = by_name(told).get(CONDITION)
         inputs = state if condition is None else torch.cat([state, condition], -1)
         return super().forward(inputs).squeeze(-1)

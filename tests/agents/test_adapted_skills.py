@@ -270,7 +270,7 @@ def test_what_is_no_base(kind: str, generator: torch.Generator) -> None:
         make(kind, PointMass(3, skills=SKILLS), generator, replace(base, parts=parts))
     with pytest.raises(AgentError, match="the base acts with 1 numbers, the environment takes 2"):
         make(kind, PointMass(3, skills=SKILLS), generator, base_of(other).pruned([1]))
-    sizes = {len(base.pruned([1]).policy[name]) for name in ("head.weight", "head.bias", "log_std", "reach")}
+    sizes = {len(base.pruned([1]).policy[name]) for name in ("head.weight", "head.bias", "log_std")}
     assert sizes == {1}
     with pytest.raises(AgentError, match="has other layers than the config's"):
         other.load_state_dict(agent.state_dict())
