@@ -10,6 +10,8 @@ from murmillo.agents.case.agent import CASE
 from murmillo.agents.common.assistance import Assistance, AssistanceConfig
 from murmillo.agents.common.base import Base
 from murmillo.agents.common.errors import AgentError
+from murmillo.agents.common.ppo import Minibatch
+from murmillo.agents.common.ranks import ALONE, Part
 from murmillo.agents.common.rollout import Rollout
 from murmillo.agents.common.runner import Runner, RunnerConfig
 from tests.agents.toy import PointMass, make_case, small_case
@@ -66,9 +68,24 @@ def test_what_acted_is_what_learns(generator: torch.Generator) -> None:
     obs = {"state": torch.randn(4, 4, generator=generator), "skill": torch.tensor([0, 1, 0, 1])}
     step = agent.act(obs)
     state = agent.model.state_normalizer(obs["state"])
-    told = agent._tell({"state": state, **step.extras})  # type: ignore[arg-type]
+    told = agent._tell(Minibatch({"state": state, **step.extras}, Part(ALONE, 4)))
     log_prob = agent.model.policy.log_prob(step.action, agent.model.policy(state, told))
     torch.testing.assert_close(log_prob, step.log_prob)
+
+
+def test_forces_that_are_gone_are_no_diversity(generator: torch.Generator) -> None:
+    agent = make_case(Helped(4, skills=2), generator, diversity="action")
+    agent.assistance.share[:] = 0.0
+    obs = {"state": torch.randn(4, 4, generator=generator), "skill": torch.tensor([0, 1, 0, 1])}
+    batch = Minibatch({"state": obs["state"], **agent.act(obs).extras}, Part(ALONE, 4))
+    losses = []
+    for factor in (1.0, 9.0):
+        with torch.no_grad():
+            agent.model.policy.head.weight[1] *= factor
+        agent.generator.manual_seed(1)
+        mean = agent.model.policy(batch["state"], agent._tell(batch))
+        losses.append(agent._diversity(batch, mean)["diversity"].item())
+    assert losses[0] == losses[1] > 0.0
 
 
 def test_nothing_goes_while_many_fall_or_too_early() -> None:
@@ -116,6 +133,8 @@ def test_a_skill_that_nobody_practised_stays_as_it_is() -> None:
     shares(assistance, 3)
     assert assistance.share.tolist() == [0.125, 0.125, 1.0]
     assert assistance.updates.tolist() == [3, 3, 0]
+    assert assistance.falls.tolist() == [0.0] * 3
+    assert assistance.follows.tolist() == [0.0] * 3
 
 
 def test_what_is_to_stay_stays() -> None:
