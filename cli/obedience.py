@@ -10,7 +10,8 @@ def section(measures: dict[str, Any], skills: dict[str, dict[str, float]]) -> st
 
     Args:
         measures: of the policy's ages, with the mean scores that the discriminator's heads gave (`Measures.heads`).
-        skills: figures of each skill by name: the share of the practice that it gets, and its score.
+        skills: figures of each skill by name: the share of the practice that it gets, its score, and what it has left
+            of residual forces, if there are any.
     """
     heads = {age: measured["heads"] for age, measured in measures.items() if measured.get("heads")}
     if not heads and not skills:
@@ -39,22 +40,17 @@ def _skills(skills: dict[str, dict[str, float]]) -> str:
     if not skills:
         return ""
     hardest_first = sorted(skills.items(), key=lambda item: -item[1]["share"])
-    helped = any("forces" in skill for skill in skills.values())
-    rows = [
-        f"| {name} | {100 * s['share']:.2f} % | {s['score']:.3f} |" + (f" {s['forces']:.2f} |" if helped else "")
-        for name, s in hardest_first
-    ]
-    return "\n".join(
-        [
-            f"Focal sampling gives each skill a share of the practice; an even one is {100 / len(skills):.2f} %. The "
-            "score is the discriminator's mean for the agent's motion under this label being a clip of it."
-            + (" Forces: what is left of the residual ones that it began with." if helped else ""),
-            "",
-            "| skill | share of the practice | score |" + (" forces |" if helped else ""),
-            "|---|---:|---:|" + ("---:|" if helped else ""),
-            *rows,
-        ]
+    text = (
+        f"Focal sampling gives each skill a share of the practice; an even one is {100 / len(skills):.2f} %. The "
+        "score is the discriminator's mean for the agent's motion under this label being a clip of it."
     )
+    table = ["| skill | share of the practice | score |", "|---|---:|---:|"]
+    table += [f"| {name} | {100 * s['share']:.2f} % | {s['score']:.3f} |" for name, s in hardest_first]
+    if all("forces" in skill for skill in skills.values()):
+        text += " Forces are what the skill has left of the residual forces that it began with."
+        left = [" forces |", "---:|", *(f" {s['forces']:.2f} |" for _, s in hardest_first)]
+        table = [row + cell for row, cell in zip(table, left, strict=True)]
+    return "\n".join([text, "", *table])
 
 
 def _figure(value: float | None) -> str:

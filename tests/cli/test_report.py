@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from omegaconf import OmegaConf
 
-from murmillo.cli import report, runs
+from murmillo.cli import obedience, report, runs
 from murmillo.cli.plots import plot_all, smooth
 
 
@@ -51,6 +51,17 @@ def test_report_has_the_figures(run_folder: Path) -> None:
         assert f"({picture})" in text
         assert (run_folder / picture).read_bytes().startswith(b"\x89PNG")
     assert "fall_rate.png" not in text
+
+
+def test_skills_are_told_with_what_they_have_left_of_forces() -> None:
+    skills = {"guard": {"share": 0.25, "score": 0.5}, "kick": {"share": 0.75, "score": 0.125}}
+    text = obedience.section({}, skills)
+    assert "| skill | share of the practice | score |\n|---|---:|---:|\n| kick | 75.00 % | 0.125 |\n| guard" in text
+    assert "forces" not in text
+    helped = {name: skill | {"forces": 2 * skill["share"] - 0.5} for name, skill in skills.items()}
+    text = obedience.section({}, helped)
+    assert "| skill | share of the practice | score | forces |\n|---|---:|---:|---:|" in text
+    assert "| kick | 75.00 % | 0.125 | 1.00 |\n| guard | 25.00 % | 0.500 | 0.00 |" in text
 
 
 def test_a_short_run_is_told_by_its_quarters(run_folder: Path) -> None:
