@@ -10,9 +10,9 @@ from murmillo.envs.physics import State
 from murmillo.envs.rotations import heading_quat, quat_rotate_inverse
 from murmillo.envs.tracking import Tracker
 
-_STIFFNESS = 20.0
-"""[1/m] Share of the greatest force that pulls a body to where the clip has it; 5 cm are the whole of it."""
-_DAMPING = 2.0
+_STIFFNESS = 10.0
+"""[1/m] Share of the greatest force that pulls a body to where the clip has it; 10 cm are the whole of it."""
+_DAMPING = 1.0
 """[s/m]"""
 
 
@@ -30,10 +30,13 @@ class Guide:
     def action(self, state: State, ground: Tensor | None = None) -> Tensor:
         """[N, A] float32, in whatever states the worlds are, over a ground [N] [m]; None is level at 0.
 
-        The targets are the clips' poses as much later as the PD control lags behind (`Character.lag`).
+        The targets are the clips' poses as much later as the PD control lags behind (`Character.lag`), and later by
+        what a clip has waited: who led to where a clip waits would hold the character there.
         """
         character = self._character
-        later = character.joint_coordinates(character.from_base(*self._tracker.wanted(character.lag))[0])
+        later = character.joint_coordinates(
+            character.from_base(*self._tracker.wanted(character.lag + self._tracker.waited))[0]
+        )
         targets = self._balance(later, state, *character.from_base(*self._tracker.wanted(0.0)), ground)
         action = character.action_of(targets)
         if not self._forces.residual_dim:
@@ -43,7 +46,7 @@ class Guide:
     def _pull(self, state: State, ground: Tensor | None) -> Tensor:
         """[N, B, 3] forces that pull the bodies to the clips' next pose, heading frame, in units of the greatest."""
         character = self._character
-        qpos, qvel = character.from_base(*self._tracker.wanted(CONTROL_DT))
+        qpos, qvel = character.from_base(*self._tracker.wanted(CONTROL_DT + self._tracker.waited))
         wanted, speed = self._seen(*character.forward_kinematics(qpos), qpos, qvel)
         here = (state.body_pos_w, state.body_quat_w, state.qpos, state.qvel)
         position, velocity = self._seen(*(part.float() for part in here))

@@ -82,7 +82,6 @@ class Tracker:
         self._clip = torch.zeros(num_envs, dtype=torch.int64)
         self._time = torch.zeros(num_envs, dtype=torch.float64)
         self._held = torch.zeros(num_envs, dtype=torch.float64)
-        """[N] [s] for which clips that have begun have waited of late."""
         self._character = character
         spans = [self._span(clip) for clip in range(len(library.clips))]
         self._first, self._last, self._again = torch.tensor(spans, dtype=torch.float64).unbind(-1)
@@ -125,8 +124,13 @@ class Tracker:
         self._end(generator)
         return reward, lost
 
-    def wanted(self, ahead: float) -> tuple[Tensor, Tensor]:
-        """Poses [N, nq] and velocities [N, nv] of the clips so much later than now [s]."""
+    @property
+    def waited(self) -> Tensor:
+        """[N] [s] for which clips that have begun have waited of late."""
+        return self._held
+
+    def wanted(self, ahead: float | Tensor) -> tuple[Tensor, Tensor]:
+        """Poses [N, nq] and velocities [N, nv] of the clips so much later than now [s], a number or [N]."""
         clip, time = self._clip, self._time.clamp_min(0.0) + ahead
         later = torch.where(time > self._last[clip], self._again[clip] + time - self._last[clip], time)
         return self._library.pose(clip, torch.maximum(later, self._first[clip]))
