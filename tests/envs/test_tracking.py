@@ -251,7 +251,11 @@ def test_the_guide_leads_further_the_longer_a_clip_has_waited():
     env._tracker.load_state_dict(state)
     for worlds, ahead in ((slice(0, 3), character.lag + 0.4), (slice(3, 6), character.lag)):
         expected = character.action_for(env._tracker.wanted(ahead)[0])[worlds]
-        np.testing.assert_allclose(env.guide()[worlds][:, arms], expected[:, arms], atol=1e-6)
+        led = env.guide()[worlds][:, arms]
+        assert env._tracker.waited.tolist() == [0.4] * 3 + [0.0] * 3
+        np.testing.assert_allclose(
+            led, expected[:, arms], atol=1e-6, err_msg=f"{ahead=} of {env._tracker.state_dict()}"
+        )
 
 
 def test_with_residual_forces_the_guide_keeps_balance():
