@@ -64,7 +64,7 @@ def _load(path: str | Path, character: Character) -> list[Clip]:
     if suffix == ".npz":
         return read_clips(path.parent, character, only=path.name)
     if suffix in SUFFIXES:
-        return _load_poselib(_read_dataset(path), character)
+        return _load_poselib(_read_dataset(path, character), character)
     raise MotionError(
         f"motions={path}: files of type {suffix or '(none)'} are unknown; known are .npy, .npz and .yaml, and "
         "`murmillo motions import` makes clips of others"
@@ -91,7 +91,7 @@ def _load_folder(folder: Path, character: Character) -> list[Clip]:
         raise MotionError(
             f"motions={folder}: holds neither {MANIFEST} nor .npy clips; make clips with `murmillo motions import`"
         )
-    datasets = {file: _read_dataset(file) for file in files if file.suffix.lower() in SUFFIXES}
+    datasets = {file: _read_dataset(file, character) for file in files if file.suffix.lower() in SUFFIXES}
     if not datasets:
         return _load_poselib(clips, character)
     complete = {file: weights for file, weights in datasets.items() if set(weights) <= set(clips)}
@@ -111,13 +111,13 @@ def _load_poselib(weights: dict[Path, float], character: Character) -> list[Clip
     return [read_poselib(read_bytes(file), file, character, weight) for file, weight in weights.items()]
 
 
-def _read_dataset(file: Path) -> dict[Path, float]:
+def _read_dataset(file: Path, character: Character) -> dict[Path, float]:
     """The clips that a dataset lists and their weights, which it must give."""
     weights = read_dataset(file)
     if foreign := [clip.name for clip in weights if clip.suffix.lower() != ".npy"]:
         raise MotionError(
             f"{file}: lists {foreign[0][:80]!a}, which is no .npy clip; make clips of them with "
-            f"`murmillo motions import {file} --to FOLDER` and give that folder"
+            f"`murmillo motions import {file} --to FOLDER --character {character.name}` and give that folder"
         )
     for clip, weight in weights.items():
         if weight is None:
