@@ -39,7 +39,7 @@ class Character:
         control_dt, substeps: seconds of a control step, and physics steps in it.
         bodies: names of the B bodies without the world, in MJCF order.
         joints: the joints without the root, in MJCF order, which is also the order of the actions.
-        key_bodies, key_sites: names of the K key points, and the ids of their sites in the model.
+        key_bodies: names of the bodies whose origins are the K key points.
         feet: the bodies that may touch the ground.
         contact_slice: where the model's sensor data hold the ground's force on each body, [B * 3] [N].
         base: the character as it was before its body was changed, whose clips it follows; itself where it was not.
@@ -66,7 +66,6 @@ class Character:
         self.key_bodies = tuple(
             sorted((key.removeprefix(_KEY) for key in keys), key=lambda body: _KEY_ORDER.index(body))
         )
-        self.key_sites = np.array([model.site(_KEY + body).id for body in self.key_bodies])
         self.feet = tuple(body for body in self.bodies if body.endswith("_foot"))
         self.contact_slice = _contact_slice(name, model, self.bodies)
         low, high = torch.from_numpy(model.actuator_ctrlrange.copy()).unbind(-1)

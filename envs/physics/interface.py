@@ -20,11 +20,9 @@ class State:
         qvel: [N, nv] root linear velocity (world) [m/s], root angular velocity (root frame) and joints [rad/s].
         body_pos_w: [N, B, 3] body origins [m].
         body_quat_w: [N, B, 4] body rotations.
-        body_com_w: [N, B, 3] centres of mass [m].
-        site_pos_w: [N, S, 3] sites [m].
         ground_force_w: [N, B, 3] force of the ground on each body in the last substep [N].
         actuator_force: [N, A] torque of the PD control at each axis of the joints in the last substep [N m].
-        key_sites: [K] which of the sites are the key points.
+        key_bodies: [K] the bodies whose origins are the key points.
         prop_qpos: [N, P, 7] the props' positions [m] and quaternions (wxyz) in the world.
         prop_qvel: [N, P, 6] their linear velocities (world) [m/s] and angular ones (own frame) [rad/s].
         hit_force_w: [N, P, B, 3] force of each prop on each body, each axis' greatest of the last step's substeps [N].
@@ -34,11 +32,9 @@ class State:
     qvel: Tensor
     body_pos_w: Tensor
     body_quat_w: Tensor
-    body_com_w: Tensor
-    site_pos_w: Tensor
     ground_force_w: Tensor
     actuator_force: Tensor
-    key_sites: Tensor
+    key_bodies: Tensor
     prop_qpos: Tensor
     prop_qvel: Tensor
     hit_force_w: Tensor
@@ -46,7 +42,7 @@ class State:
     @property
     def key_pos_w(self) -> Tensor:
         """[N, K, 3] key points [m], a copy."""
-        return self.site_pos_w[:, self.key_sites]
+        return self.body_pos_w[:, self.key_bodies]
 
 
 class Physics(Protocol):

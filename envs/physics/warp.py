@@ -85,7 +85,7 @@ class WarpPhysics:
         self._ctrl.copy_(ctrl)
         self._xfrc.zero_()
         if body_force_w is not None:
-            arm = self.state.body_pos_w - self.state.body_com_w
+            arm = self.state.body_pos_w - self._com_w
             force = body_force_w.to(arm)
             self._xfrc[..., :3] = force
             self._xfrc[..., 3:] = torch.linalg.cross(arm, force)
@@ -250,11 +250,11 @@ class WarpPhysics:
     def _views(self, scene: Scene) -> State:
         """The data as torch sees them."""
         character, props, data = scene.character, len(scene.props), self._data
-        names = (*_INTEGRATED, "qacc", "actuator_force", "overflow", "xpos", "xquat", "xipos", "site_xpos")
+        names = (*_INTEGRATED, "qacc", "actuator_force", "overflow", "xpos", "xquat", "xipos")
         self._torch = {name: wp.to_torch(getattr(data, name)) for name in names}
         self._ctrl, self._overflow = self._torch["ctrl"], self._torch["overflow"]
         own = slice(1, 1 + len(character.bodies))
-        self._xfrc = self._torch["xfrc_applied"][:, own]
+        self._xfrc, self._com_w = self._torch["xfrc_applied"][:, own], self._torch["xipos"][:, own]
         nq, nv = character.model.nq, character.model.nv
         qpos, qvel = self._torch["qpos"], self._torch["qvel"]
         return State(
@@ -262,11 +262,9 @@ class WarpPhysics:
             qvel=qvel[:, :nv],
             body_pos_w=self._torch["xpos"][:, own],
             body_quat_w=self._torch["xquat"][:, own],
-            body_com_w=self._torch["xipos"][:, own],
-            site_pos_w=self._torch["site_xpos"],
             ground_force_w=wp.to_torch(self._ground_force),
             actuator_force=self._torch["actuator_force"],
-            key_sites=torch.as_tensor(character.key_sites, device=self.device),
+            key_bodies=torch.tensor(character.body_ids(character.key_bodies), device=self.device),
             prop_qpos=qpos[:, nq:].unflatten(1, (props, 7)),
             prop_qvel=qvel[:, nv:].unflatten(1, (props, 6)),
             hit_force_w=wp.to_torch(self._hit_force),
