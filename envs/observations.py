@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 from murmillo.envs.character import Character
-from murmillo.envs.rotations import heading_quat, quat_conj, quat_mul, quat_rotate, tan_norm
+from murmillo.envs.rotations import heading, quat_rotate, tan_norm
 
 
 def state_dim(character: Character) -> int:
@@ -42,23 +42,31 @@ def character_state(character: Character, qpos: Tensor, qvel: Tensor, key_pos_w:
         [..., 120] for the sword-and-shield humanoid.
     """
     layout = _layout(character, qpos.device)
-    root_pos_w, root_quat_w = qpos[..., 0:3], qpos[..., 3:7]
-    to_heading = quat_conj(heading_quat(root_quat_w))
-    root_quat_h = quat_mul(to_heading, root_quat_w)
-    key_pos_h = quat_rotate(to_heading.unsqueeze(-2), key_pos_w - root_pos_w.unsqueeze(-2))
-    joints = qpos.new_empty(*qpos.shape[:-1], layout.width)
-    joints[..., layout.ball_columns] = tan_norm(qpos[..., layout.ball_qpos])
-    joints[..., layout.hinge_columns] = qpos[..., layout.hinge_qpos]
+    # poses side by side in memory, and few operations on much: a hundred worlds cost half as much so
+    pose, speed, key_pos_w = (_rows(part) for part in (qpos, qvel, key_pos_w.flatten(-2)))
+    root_quat_w = pose[3:7]
+    yaw = heading(root_quat_w, dim=0)
+    turned_back = layout.signs * root_quat_w.flip(0)
+    root_quat_h = (0.5 * yaw).cos() * root_quat_w + (0.5 * yaw).sin() * turned_back
+    quats = torch.cat((root_quat_h, pose.index_select(0, layout.balls))).unflatten(0, (-1, 4))
+    vectors_w = torch.cat((key_pos_w.unflatten(0, (-1, 3)) - pose[0:3], speed[None, 0:3]))
+    (x, y, up), cosine, sine = vectors_w.unbind(1), yaw.cos(), yaw.sin()
     parts = [
-        root_pos_w[..., 2:3],
-        tan_norm(root_quat_h),
-        quat_rotate(to_heading, qvel[..., 0:3]),
-        quat_rotate(root_quat_h, qvel[..., 3:6]),
-        joints,
-        qvel[..., 6:],
-        key_pos_h.flatten(-2),
+        pose,
+        speed,
+        tan_norm(quats, dim=1).flatten(0, 1),
+        torch.addcmul(cosine * x, sine, y),
+        torch.addcmul(cosine * y, sine, x, value=-1),
+        up,
+        quat_rotate(root_quat_h, speed[3:6], dim=0),
     ]
-    return torch.cat(parts, dim=-1).float()
+    columns = torch.cat(parts).index_select(0, layout.columns).float()
+    return columns.T.reshape(*qpos.shape[:-1], len(columns))
+
+
+def _rows(part: Tensor) -> Tensor:
+    """[d, n] of [..., d]."""
+    return part.reshape(-1, part.shape[-1]).T.contiguous()
 
 
 class StateParts(NamedTuple):
@@ -119,25 +127,38 @@ def idle_bodies(character: Character, masked: Collection[str]) -> tuple[str, ...
 
 @dataclass(frozen=True)
 class _Layout:
-    """Where the joints lie: `*_qpos` in qpos, `*_columns` among the `width` columns of joint rotations."""
+    """Where `character_state` finds what it is made of.
 
-    width: int
-    ball_qpos: Tensor
-    ball_columns: Tensor
-    hinge_qpos: Tensor
-    hinge_columns: Tensor
+    Attributes:
+        balls: [4 J] rows of the ball joints' quaternions in qpos.
+        columns: [D] where its columns lie among all that it reckons.
+        signs: [4, 1] that make the product of a flipped quaternion (z, y, x, w) with the z axis.
+    """
+
+    balls: Tensor
+    columns: Tensor
+    signs: Tensor
 
 
 @lru_cache(maxsize=8)
 def _layout(character: Character, device: torch.device) -> _Layout:
-    column, ball, hinge = 0, [], []
+    """The rows are qpos, qvel, six of the root and of each ball joint, and x, y, z of key points, velocity and spin."""
+    model, keys = character.model, len(character.key_bodies)
+    rotations = model.nq + model.nv
+    balls, joints, free = list[int](), list[int](), rotations + 6
     for joint in character.joints:
         if joint.kind == "ball":
-            ball.append((range(joint.qpos.start, joint.qpos.stop), range(column, column + 6)))
-            column += 6
+            balls += range(joint.qpos.start, joint.qpos.stop)
+            joints += range(free, free + 6)
+            free += 6
         else:
-            hinge.append((joint.qpos.start, column))
-            column += 1
-    ball_qpos, ball_columns = (torch.tensor([list(pair[i]) for pair in ball], device=device) for i in (0, 1))
-    hinge_qpos, hinge_columns = torch.tensor(hinge, device=device).unbind(-1)
-    return _Layout(column, ball_qpos, ball_columns, hinge_qpos, hinge_columns)
+            joints.append(joint.qpos.start)
+    vector = [[free + axis * (keys + 1) + i for axis in range(3)] for i in range(keys + 1)]
+    spin = free + 3 * (keys + 1)
+    columns = [2, *range(rotations, rotations + 6), *vector[-1], *range(spin, spin + 3), *joints]
+    columns += [*range(model.nq + 6, model.nq + model.nv), *(row for key in vector[:-1] for row in key)]
+    return _Layout(
+        torch.tensor(balls, dtype=torch.int64, device=device),
+        torch.tensor(columns, device=device),
+        torch.tensor([[1.0], [1.0], [-1.0], [-1.0]], device=device),
+    )

@@ -1,6 +1,8 @@
-"""Rotations as torch functions. Quaternions [..., 4] are wxyz and of unit norm; leading shapes broadcast."""
+"""Rotations as torch functions. Quaternions [..., 4] are wxyz and of unit norm; leading shapes broadcast.
 
-from collections.abc import Sequence
+Where a function has a `dim`, components may lie along another dimension than the last: with poses side by side in
+memory a hundred worlds cost half as much.
+"""
 
 import torch
 from torch import Tensor
@@ -26,12 +28,12 @@ def quat_conj(q: Tensor) -> Tensor:
     return torch.cat((q[..., :1], -q[..., 1:]), dim=-1)
 
 
-def quat_rotate(q: Tensor, v: Tensor) -> Tensor:
+def quat_rotate(q: Tensor, v: Tensor, dim: int = -1) -> Tensor:
     """Rotate the vectors v [..., 3] by q [..., 4]."""
-    w, xyz = q[..., :1], q[..., 1:]
+    w, xyz = q.split((1, 3), dim)
     xyz, v = torch.broadcast_tensors(xyz, v)
-    t = 2.0 * torch.linalg.cross(xyz, v)
-    return v + w * t + torch.linalg.cross(xyz, t)
+    t = 2.0 * torch.linalg.cross(xyz, v, dim=dim)
+    return v + w * t + torch.linalg.cross(xyz, t, dim=dim)
 
 
 def quat_rotate_inverse(q: Tensor, v: Tensor) -> Tensor:
@@ -69,64 +71,29 @@ def slerp(a: Tensor, b: Tensor, t: Tensor) -> Tensor:
     return q / q.norm(dim=-1, keepdim=True)
 
 
-def heading(q: Tensor) -> Tensor:
+def heading(q: Tensor, dim: int = -1) -> Tensor:
     """Yaw [...] [rad]: direction of the rotated x axis in the ground plane."""
-    w, x, y, z = q.unbind(-1)
+    w, x, y, z = q.unbind(dim)
     return torch.atan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z))
 
 
-def heading_quat(q: Tensor) -> Tensor:
+def heading_quat(q: Tensor, dim: int = -1) -> Tensor:
     """The rotation about z [..., 4] by the heading of q."""
-    half = 0.5 * heading(q)
+    half = 0.5 * heading(q, dim)
     zero = torch.zeros_like(half)
-    return torch.stack((torch.cos(half), zero, zero, torch.sin(half)), dim=-1)
+    return torch.stack((torch.cos(half), zero, zero, torch.sin(half)), dim)
 
 
-def tan_norm(q: Tensor) -> Tensor:
+def tan_norm(q: Tensor, dim: int = -1) -> Tensor:
     """Continuous 6-D code of a rotation [..., 6]: the rotated x axis, then the rotated z axis (ASE section 8.1)."""
-    w, x, y, z = q.unbind(-1)
-    return torch.stack(
-        (
-            1.0 - 2.0 * (y * y + z * z),
-            2.0 * (x * y + w * z),
-            2.0 * (x * z - w * y),
-            2.0 * (x * z + w * y),
-            2.0 * (y * z - w * x),
-            1.0 - 2.0 * (x * x + y * y),
-        ),
-        dim=-1,
+    w, x, y, z = q.unbind(dim)
+    xz, wy, yy = x * z, w * y, y * y
+    half = (
+        0.5 - torch.addcmul(yy, z, z),
+        torch.addcmul(x * y, w, z),
+        xz - wy,
+        xz + wy,
+        torch.addcmul(y * z, w, x, value=-1),
+        0.5 - torch.addcmul(yy, x, x),
     )
-
-
-Components = tuple[Tensor, ...]
-"""A quaternion (w, x, y, z) or a vector (x, y, z) as tensors of one shape each: many small sums run faster on these."""
-
-
-def components_mul(a: Components, b: Components) -> Components:
-    """`quat_mul` of components."""
-    aw, ax, ay, az = a
-    bw, bx, by, bz = b
-    return (
-        (aw * bw).addcmul_(ax, bx, value=-1).addcmul_(ay, by, value=-1).addcmul_(az, bz, value=-1),
-        (aw * bx).addcmul_(ax, bw).addcmul_(ay, bz).addcmul_(az, by, value=-1),
-        (aw * by).addcmul_(ax, bz, value=-1).addcmul_(ay, bw).addcmul_(az, bx),
-        (aw * bz).addcmul_(ax, by).addcmul_(ay, bx, value=-1).addcmul_(az, bw),
-    )
-
-
-def components_rotate(q: Components, v: Components) -> Components:
-    """`quat_rotate` of components."""
-    w, *xyz = q
-    t = components_cross(xyz, [2.0 * x for x in v])
-    return tuple(x + u.addcmul_(w, s) for x, u, s in zip(v, components_cross(xyz, t), t, strict=True))
-
-
-def components_cross(a: Sequence[Tensor], b: Sequence[Tensor]) -> Components:
-    """The cross product of components."""
-    ax, ay, az = a
-    bx, by, bz = b
-    return (
-        (ay * bz).addcmul_(az, by, value=-1),
-        (az * bx).addcmul_(ax, bz, value=-1),
-        (ax * by).addcmul_(ay, bx, value=-1),
-    )
+    return 2.0 * torch.stack(half, dim)

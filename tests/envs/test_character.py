@@ -67,6 +67,14 @@ def test_soles_touch_the_ground_in_the_zero_pose(character):
     assert lowest_point(character, character.default_qpos).item() == pytest.approx(0.0, abs=1e-4)
 
 
+def test_forward_kinematics_of_a_pose_does_not_depend_on_the_poses_beside_it(character):
+    poses = random_qpos(character, 37)
+    together = character.forward_kinematics(poses)
+    for chosen in ([], [5], [0, 36], list(range(1, 30))):
+        for alone, among in zip(character.forward_kinematics(poses[chosen]), together, strict=True):
+            assert torch.equal(alone, among[chosen])
+
+
 def test_forward_kinematics_is_mujocos(character):
     data = mujoco.MjData(character.model)
     poses = random_qpos(character, 16)

@@ -30,7 +30,10 @@ def features(character: Character, qpos: torch.Tensor, qvel: torch.Tensor) -> to
 
 def test_width(character):
     assert state_dim(character) == 120
-    assert features(character, *moving_pose(character, 0)).shape == (1, 120)
+    qpos, qvel = moving_pose(character, 0)
+    for shape in ((), (1,), (0,), (2, 3)):
+        poses = (part[0].expand(*shape, -1) for part in (qpos, qvel))
+        assert features(character, *poses).shape == (*shape, 120)
 
 
 def test_the_default_pose_reads_as_the_table_says(character):

@@ -188,7 +188,8 @@ def test_windows_on_frames_are_those_of_the_poses(make_clip, character):
     back = torch.arange(8, -1, -1, dtype=torch.float64) / 30
     poses = library.pose(clip.repeat_interleave(9), (time[:, None] - back).flatten())
     reckoned = character_state(character, *poses, character.key_positions(poses[0])).unflatten(0, (200, 9))
-    torch.testing.assert_close(known, reckoned, atol=1e-5, rtol=0)
+    # headings near the vertical multiply what float32 poses are rounded by
+    torch.testing.assert_close(known, reckoned, atol=1e-5, rtol=1e-5)
 
 
 def test_clips_of_odd_rates_have_no_windows_at_hand(library):
