@@ -70,7 +70,8 @@ class TrainConfig:
         seed: of everything random.
         physics: what simulates, "cpu" or "warp" (docs/gpu.md).
         device: where it learns: "auto" is the CPU, of "warp" the first GPU; "cuda:1" and the like, or "cpu".
-        matmul: how exact float32 products of matrices are on a GPU that has TF32.
+        matmul: how exact float32 products of matrices are while it learns: "highest"; "tf32" on a GPU that has it;
+            "bf16" in the trunks of discriminators alone; "auto" is bf16 on a processor with units for it, else highest.
         threads: CPU threads; 0 takes every core that the process may use.
     """
 
@@ -89,7 +90,7 @@ class TrainConfig:
     seed: int = 1
     physics: Literal["cpu", "warp"] = "cpu"
     device: str = "auto"
-    matmul: Literal["highest", "tf32"] = "highest"
+    matmul: Literal["auto", "highest", "tf32", "bf16"] = "auto"
     threads: int = 0
 
 

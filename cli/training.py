@@ -15,6 +15,7 @@ from typing import Any
 import torch
 
 from murmillo.agents.common import checkpoint
+from murmillo.agents.common.exactness import choose, exactness
 from murmillo.agents.common.guided_start import guided_start
 from murmillo.agents.common.interface import Labelled
 from murmillo.agents.common.logger import Logger
@@ -39,9 +40,6 @@ from murmillo.cli.progress import Progress, make_progress
 from murmillo.envs import HumanoidVectorEnv
 from murmillo.envs.devices import on
 from murmillo.envs.motion.licences import terms_of
-
-MATMUL = {"highest": "highest", "tf32": "high"}
-"""Torch's words for how exact products of matrices are."""
 
 FILM_S = 6
 """Length of the film: without a graphics card a second of it takes five to draw."""
@@ -68,7 +66,6 @@ def train(config: TrainConfig, suffix: str = "", ranks: Ranks = ALONE) -> int:
     kind = choices["agent"] if config.base is None else f"{choices['agent']}-{choices['to']}"
     name = config.run.name or runs.default_name(kind, choices["budget"], config.seed, suffix)
     folder, resuming = launch.open_run(config, name, ranks)
-    torch.set_float32_matmul_precision(MATMUL[config.matmul])
     env = HumanoidVectorEnv(config.num_envs // ranks.size, for_training(launch.share_threads(config)))
     try:
         with kept(folder, config, resuming, ranks), on(env.device):
@@ -143,7 +140,8 @@ def _train(config: TrainConfig, env: HumanoidVectorEnv, folder: Path, resuming: 
         if not resuming:
             _warm_start(config, runner, generator, progress)
 
-    stopped = follow(runner, folder, opening, begin=begin, on_iteration=keep)
+    with exactness(choose(config.matmul, env.device)):
+        stopped = follow(runner, folder, opening, begin=begin, on_iteration=keep)
     if not ranks.first:
         return 0
     _keep_skills(agent, env, folder)

@@ -11,6 +11,7 @@ import torch
 from torch import Tensor, nn
 
 from murmillo.agents.common.errors import AgentError
+from murmillo.agents.common.exactness import rounded
 from murmillo.agents.common.networks import Dropout, Rectifier, linear, mlp
 from murmillo.agents.common.normalizer import RunningNormalizer
 from murmillo.agents.common.numbers import check_above_zero, check_at_least
@@ -160,7 +161,8 @@ class Discriminator(nn.Module):
 
     def features(self, x: Tensor, condition: Tensor | None = None) -> Tensor:
         """The trunk's last layer `[B, H]` on prepared windows `[B, W D]`; an encoder may sit on it."""
-        return self.trunk(self.condition.join(x, condition))
+        with rounded(x.device):
+            return self.trunk(self.condition.join(x, condition)).float()
 
     def judge(self, features: Tensor, condition: Tensor | None = None) -> Tensor:
         """Logits `[B]` from features `[B, H]`."""

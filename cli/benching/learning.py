@@ -7,6 +7,7 @@ from typing import Any
 
 import torch
 
+from murmillo.agents.common.exactness import choose, exactness
 from murmillo.agents.common.runner import Runner
 from murmillo.cli import agents, checks, versions
 from murmillo.cli import config as configuration
@@ -18,7 +19,6 @@ from murmillo.cli.adaptation.words import are_about_adaptnet
 from murmillo.cli.benching.turns import Rates
 from murmillo.cli.config import TrainConfig
 from murmillo.cli.devices import for_training
-from murmillo.cli.training import MATMUL
 from murmillo.envs import HumanoidVectorEnv
 from murmillo.envs.devices import on
 
@@ -86,6 +86,7 @@ class Learning:
         torch.set_num_threads(config.threads or versions.usable_cores())
         self.label = label
         env, agent, generator = _make(config)
+        self._exactness = choose(getattr(config, "matmul", "highest"), env.device)
         self._runner = Runner(env, agent, config.runner, generator, os.devnull)  # which nothing is saved to
         self.samples = env.num_envs * config.runner.horizon
 
@@ -102,7 +103,7 @@ class Learning:
             self._runner._collect()
 
     def turn(self) -> Rates:
-        with on(self.env.device):
+        with on(self.env.device), exactness(self._exactness):
             return self._iterate()
 
     def _iterate(self) -> Rates:
@@ -133,7 +134,6 @@ def _make(config: TrainConfig | AdaptNetTrainConfig) -> tuple[HumanoidVectorEnv,
         env = world.make_env(config, config.num_envs, training=True)
         with on(env.device):
             return env, *world.make_agent(config, None, env)
-    torch.set_float32_matmul_precision(MATMUL[config.matmul])
     env = HumanoidVectorEnv(config.num_envs, for_training(config.env))
     with on(env.device):
         return env, *agents.make_agent(config.choices["agent"], config.agent, env, config.seed)

@@ -84,6 +84,17 @@ def test_ablations_train(murmillo: Murmillo, folder: Path, tiny: tuple[str, ...]
     assert ("reward/skill" in rows(folder / "runs" / "less")[0]) == (ablation != "no_skill_discovery")
 
 
+@pytest.mark.parametrize("matmul", ["tf32", "bf16"])
+def test_a_run_that_rounds_is_measured_exactly(
+    murmillo: Murmillo, folder: Path, tiny: tuple[str, ...], matmul: str
+) -> None:
+    """Coverage refuses to measure with rounded products."""
+    words = (*tiny, f"matmul={matmul}", "runner.samples=64", "run.evaluate=true", "run.name=rounded")
+    status, _, err = murmillo("train", *words)
+    assert status == 0, err
+    assert list((folder / "runs" / "rounded" / "evaluation").glob("*.json"))
+
+
 @pytest.mark.skipif(os.name == "nt", reason="Windows has no such signals")
 def test_a_signal_ends_the_run_with_a_checkpoint(folder: Path, tiny: tuple[str, ...]) -> None:
     status, out, err = interrupted(signal.SIGTERM, folder, *tiny, "run.name=long")
