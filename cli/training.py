@@ -8,7 +8,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -100,6 +100,8 @@ def undone_by_mistakes(folder: Path, resuming: bool) -> Iterator[None]:
                 (folder / name).write_bytes(data)
         elif not (folder / runs.SCALARS).exists():  # not one iteration was made
             shutil.rmtree(folder, ignore_errors=True)
+            with suppress(OSError):  # other runs are in it
+                folder.parent.rmdir()
         raise
 
 

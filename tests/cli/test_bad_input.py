@@ -59,6 +59,17 @@ def test_wrong_words(murmillo: Murmillo, folder: Path, words: tuple[str, ...], p
     assert list(folder.iterdir()) == []
 
 
+@pytest.mark.parametrize("word", ["+runner.reward_weights.nothing=1", "agent.discriminator.dropout=3"])
+def test_a_mistake_that_shows_late(murmillo: Murmillo, folder: Path, tiny: tuple[str, ...], word: str) -> None:
+    """The run's folder is there by then, alone in its root or beside another."""
+    key = word.strip("+").rpartition(".")[2].partition("=")[0]
+    assert_refused(murmillo("train", *tiny, word), key)
+    assert list(folder.iterdir()) == []
+    (folder / "runs" / "other").mkdir(parents=True)
+    assert_refused(murmillo("train", *tiny, word), key)
+    assert [path.name for path in (folder / "runs").iterdir()] == ["other"]
+
+
 def test_an_empty_folder_of_clips(murmillo: Murmillo, folder: Path) -> None:
     (folder / "clips").mkdir()
     assert_refused(murmillo("train", "motions=clips"), "clips")
