@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import torch
 
+from murmillo.agents.common.exactness import WORDS
 from murmillo.cli.benching import learning, measuring, stepping
 from murmillo.cli.benching.turns import Spread, one_round, rate_of, ratio_of
 from murmillo.envs import EnvConfig
@@ -112,6 +113,21 @@ def test_worlds_begin_as_copies_of_few(task: str) -> None:
 
 
 @pytest.mark.usefixtures("small")
+@pytest.mark.parametrize("matmul", ["highest", "bf16"])
+def test_iterations_round_as_the_training_does(
+    monkeypatch: pytest.MonkeyPatch, tiny: tuple[str, ...], matmul: str
+) -> None:
+    threads, rounded = torch.get_num_threads(), []
+    trained = learning.Learning(learning.compose([*tiny, f"matmul={matmul}"]))
+    monkeypatch.setattr(
+        trained._runner.agent, "update", lambda rollout: rounded.append(torch.get_float32_matmul_precision())
+    )
+    trained.turn()
+    trained.close()
+    torch.set_num_threads(threads)
+    assert rounded == [WORDS[matmul]]
+
+
 def test_mean_contacts() -> None:
     """Four worlds hang in the air, one stands on the ground."""
     env = stepping.make_warm(5, EnvConfig())

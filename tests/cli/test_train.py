@@ -9,7 +9,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+import torch
 
+from murmillo.agents.common.exactness import WORDS
+from murmillo.agents.common.runner import Runner
 from murmillo.cli import gl
 from tests.cli.running import interrupted, rows
 
@@ -86,12 +89,20 @@ def test_ablations_train(murmillo: Murmillo, folder: Path, tiny: tuple[str, ...]
 
 @pytest.mark.parametrize("matmul", ["tf32", "bf16"])
 def test_a_run_that_rounds_is_measured_exactly(
-    murmillo: Murmillo, folder: Path, tiny: tuple[str, ...], matmul: str
+    murmillo: Murmillo, folder: Path, tiny: tuple[str, ...], matmul: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Coverage refuses to measure with rounded products."""
+    learned, run = [], Runner.run
+
+    def noted(runner: Runner) -> None:
+        learned.append(torch.get_float32_matmul_precision())
+        run(runner)
+
+    monkeypatch.setattr(Runner, "run", noted)
     words = (*tiny, f"matmul={matmul}", "runner.samples=64", "run.evaluate=true", "run.name=rounded")
     status, _, err = murmillo("train", *words)
     assert status == 0, err
+    assert learned == [WORDS[matmul]]
     assert list((folder / "runs" / "rounded" / "evaluation").glob("*.json"))
 
 

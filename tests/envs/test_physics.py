@@ -54,9 +54,16 @@ def test_write_moves_only_the_worlds_it_names_and_forgets_their_past(character):
         physics.step(character.targets(actions(3, step)))
     before = physics.state.qpos[[0, 2]].clone()
     qpos = character.default_qpos[None].clone()
+    qpos[0, 0] = 7.0
     physics.write(torch.tensor([1]), qpos, torch.zeros(1, 37))
     fresh.write(torch.tensor([0]), qpos, torch.zeros(1, 37))
     assert torch.equal(physics.state.qpos[[0, 2]], before)
+    for found, expected in zip(
+        (physics.state.body_pos_w, physics.state.body_quat_w),
+        character.forward_kinematics(physics.state.qpos),
+        strict=True,
+    ):
+        assert torch.equal(found, expected)
     for step in range(5):
         ctrl = character.targets(actions(3, step))
         physics.step(ctrl)
@@ -69,6 +76,8 @@ def test_state_dict_continues_bit_for_bit(character):
     for step in range(10):
         one.step(character.targets(actions(2, step)))
     other.load_state_dict(one.state_dict())
+    assert torch.equal(one.state.body_pos_w, other.state.body_pos_w)
+    assert torch.equal(one.state.body_quat_w, other.state.body_quat_w)
     for step in range(10):
         for physics in (one, other):
             physics.step(character.targets(actions(2, step)))
