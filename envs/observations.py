@@ -131,7 +131,7 @@ class _Layout:
 
     Attributes:
         balls: [4 J] rows of the ball joints' quaternions in qpos.
-        columns: [D] where its columns lie among all that it reckons.
+        columns: [D] its columns, as rows of all that it reckons.
         signs: [4, 1] that make the product of a flipped quaternion (z, y, x, w) with the z axis.
     """
 
@@ -145,18 +145,18 @@ def _layout(character: Character, device: torch.device) -> _Layout:
     """The rows are qpos, qvel, six of the root and of each ball joint, and x, y, z of key points, velocity and spin."""
     model, keys = character.model, len(character.key_bodies)
     rotations = model.nq + model.nv
-    balls, joints, free = list[int](), list[int](), rotations + 6
+    balls, joints, row = list[int](), list[int](), rotations + 6
     for joint in character.joints:
         if joint.kind == "ball":
             balls += range(joint.qpos.start, joint.qpos.stop)
-            joints += range(free, free + 6)
-            free += 6
+            joints += range(row, row + 6)
+            row += 6
         else:
             joints.append(joint.qpos.start)
-    vector = [[free + axis * (keys + 1) + i for axis in range(3)] for i in range(keys + 1)]
-    spin = free + 3 * (keys + 1)
-    columns = [2, *range(rotations, rotations + 6), *vector[-1], *range(spin, spin + 3), *joints]
-    columns += [*range(model.nq + 6, model.nq + model.nv), *(row for key in vector[:-1] for row in key)]
+    *points, velocity = [[row + axis * (keys + 1) + i for axis in range(3)] for i in range(keys + 1)]
+    spin = row + 3 * (keys + 1)
+    columns = [2, *range(rotations, rotations + 6), *velocity, *range(spin, spin + 3), *joints]
+    columns += [*range(model.nq + 6, model.nq + model.nv), *(axis for point in points for axis in point)]
     return _Layout(
         torch.tensor(balls, dtype=torch.int64, device=device),
         torch.tensor(columns, device=device),

@@ -58,6 +58,7 @@ def test_write_moves_only_the_worlds_it_names_and_forgets_their_past(character):
     physics.write(torch.tensor([1]), qpos, torch.zeros(1, 37))
     fresh.write(torch.tensor([0]), qpos, torch.zeros(1, 37))
     assert torch.equal(physics.state.qpos[[0, 2]], before)
+    assert not physics.state.ground_force_w[1].any()
     for found, expected in zip(
         (physics.state.body_pos_w, physics.state.body_quat_w),
         character.forward_kinematics(physics.state.qpos),
