@@ -75,15 +75,15 @@ class Page:
         loop, session, scene = self._loop, self._session, self._scene
         with self._gui.add_folder("Time"):
             pause = self._gui.add_checkbox("Stand still", False)
-            self._on_user(pause, lambda: loop.pause(pause.value))
+            self._on_user(pause, loop.pause)
             self._button("One step", loop.step_once, key="N")
             speed = self._gui.add_slider("Speed of time", 0.1, 2.0, 0.1, 1.0, marks=((0.1, "0.1"), (1.0, "1")))
-            self._on_user(speed, lambda: loop.set_speed(speed.value))
+            self._on_user(speed, loop.set_speed)
             self._button("New episode", session.reset, key="R")
             lie = self._gui.add_checkbox("Stay down after a fall", False)
-            self._on_user(lie, lambda: setattr(session, "stay_down", lie.value))
+            self._on_user(lie, lambda chosen: setattr(session, "stay_down", chosen))
             follow = self._gui.add_checkbox("Camera follows", True)
-            self._on_user(follow, lambda: setattr(scene, "follow", follow.value))
+            self._on_user(follow, lambda chosen: setattr(scene, "follow", chosen))
 
         def toggle() -> None:
             pause.value = not loop.paused
@@ -96,7 +96,7 @@ class Page:
         with self._gui.add_folder("Push for 0.2 s"):
             force = self._gui.add_slider("Newtons", 50, 2000, 50, 500)
             towards = self._gui.add_button_group("Towards", tuple(_PUSHES))
-        towards.on_click(lambda event: self._loop.do(lambda: session.push(_PUSHES[event.target.value], force.value)))
+        self._on_user(towards, lambda chosen: session.push(_PUSHES[chosen], force.value))
         self._key("F", lambda: session.push(0.0, force.value))
 
     # --- what some can be told ----------------------------------------------------------------------------------------
@@ -105,12 +105,15 @@ class Page:
         names = (_CHANCE, *skills)
         with self._gui.add_folder("Skill"):
             chosen = self._gui.add_dropdown("Commanded", names)
-        command = lambda: self._session.command_skill(None if chosen.value == _CHANCE else chosen.value)  # noqa: E731
-        self._on_user(chosen, command)
+
+        def command(name: str) -> None:
+            self._session.command_skill(None if name == _CHANCE else name)
 
         def go(by: int) -> None:
             chosen.value = names[(names.index(chosen.value) + by) % len(names)]
-            command()
+            command(chosen.value)
+
+        self._on_user(chosen, command)
 
         self._key("pageup", lambda: go(-1))
         self._key("pagedown", lambda: go(1))
@@ -135,13 +138,13 @@ class Page:
                 latents.follow(first.value, None if second.value == _NOBODY else second.value, part.value)
 
         for control in (first, second, part):
-            self._on_user(control, follow)
+            self._on_user(control, lambda _: follow())
 
     def _add_adaptation(self, adapted: Blending) -> None:
         ends = "0 is the base, 1 the adaptation" if adapted.adapters == 1 else "0 is the second adaptation, 1 the first"
         with self._gui.add_folder("Adaptation"):
             alpha = self._gui.add_slider("Alpha", 0.0, 1.0, 0.01, adapted.alpha, hint=ends)
-        self._on_user(alpha, lambda: self._session.blend(alpha.value))
+        self._on_user(alpha, self._session.blend)
 
     def _add_goals(self, server: viser.ViserServer) -> None:
         goals = self._session.goals
@@ -164,9 +167,12 @@ class Page:
     def _slider(
         self, name: str, label: str, low: float, high: float, step: float, command: Callable[[float], None]
     ) -> None:
-        slider = self._gui.add_slider(label, low, high, step, 0.0)
-        self._on_user(slider, lambda: command(slider.value))
-        self._sliders[name] = slider
+        def move(value: float) -> None:
+            command(value)
+            self._followed[name] = self._holds(name)
+
+        slider = self._sliders[name] = self._gui.add_slider(label, low, high, step, 0.0)
+        self._on_user(slider, move)
 
     def _turn(self, degrees: float) -> None:
         self._session.goals.move(self._angle(DIRECTION) + math.radians(degrees))
@@ -180,15 +186,19 @@ class Page:
         x, y = self._session.goals.now(name).tolist()
         return math.atan2(y, x)
 
-    def _follow_goals(self) -> None:
-        """Let the sliders show what holds, whoever has set it.
+    def _holds(self, name: str) -> float:
+        """What the slider of a goal is to show."""
+        slider = self._sliders[name]
+        value = self._session.goals.now(name).item() if name == SPEED else math.degrees(self._angle(name))
+        return min(max(round(value / slider.step) * slider.step, slider.min), slider.max)
 
-        Where it has not changed, a slider stays as it is: a user may have moved it, and the command be on its way.
+    def _follow_goals(self) -> None:
+        """Let the sliders show what anything but themselves has set.
+
+        Else one stays as it is: a user may have moved it further, and the command be on its way.
         """
         for name, slider in self._sliders.items():
-            goals = self._session.goals
-            value = goals.now(name).item() if name == SPEED else math.degrees(self._angle(name))
-            shown = min(max(round(value / slider.step) * slider.step, slider.min), slider.max)
+            shown = self._holds(name)
             changed = self._followed.get(name) != shown
             self._followed[name] = shown
             if changed and abs(shown - slider.value) > 0.5 * slider.step:
@@ -198,17 +208,31 @@ class Page:
 
     def _button(self, label: str, command: Callable[[], object], key: Any = None) -> viser.GuiButtonHandle:
         button = self._gui.add_button(label, hint=None if key is None else f"Key {key}")
-        button.on_click(lambda _: self._loop.do(command))
+        self._on_user(button, lambda _: command())
         if key is not None:
             self._key(key, command)
         return button
 
     def _key(self, key: Any, command: Callable[[], object]) -> None:
-        self._gui.add_command(KEYS[key].capitalize(), hotkey=key).on_trigger(lambda _: self._loop.do(command))
+        async def pressed(_: Any) -> None:
+            self._loop.do(command)
 
-    def _on_user(self, control: Any, command: Callable[[], object]) -> None:
-        """Have this done when a user moves a control, but not when the page itself does."""
-        control.on_update(lambda event: self._loop.do(command) if event.client is not None else None)
+        self._gui.add_command(KEYS[key].capitalize(), hotkey=key).on_trigger(pressed)
+
+    def _on_user(self, control: Any, command: Callable[[Any], object]) -> None:
+        """Have this done with its value when a user moves a control, but not when the page itself does.
+
+        The value is that of this move, and moves are handed on in their order: what is not asynchronous viser gives to
+        threads, which may find another value and overtake each other.
+        """
+
+        async def moved(event: Any) -> None:
+            if event.client is not None:
+                value = event.target.value
+                self._loop.do(lambda: command(value))
+
+        pressed = isinstance(control, viser.GuiButtonHandle | viser.GuiButtonGroupHandle)
+        (control.on_click if pressed else control.on_update)(moved)
 
     def _on_ground_click(self, server: viser.ViserServer, command: Callable[[float, float], None]) -> None:
         @server.scene.on_click()

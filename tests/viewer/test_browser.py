@@ -8,11 +8,16 @@ from contextlib import contextmanager
 import pytest
 import torch
 
-from murmillo.viewer.session import Session
+from murmillo.viewer.session import Frame, Session
 
 pytest.importorskip("viser", reason="the extra play is not installed")
 
-from murmillo.viewer.serving import serve  # after the extra was looked for
+import viser  # after the extra was looked for
+
+from murmillo.viewer.loop import Loop
+from murmillo.viewer.page import Page
+from murmillo.viewer.scene import Scene
+from murmillo.viewer.serving import serve
 from tests.viewer.browser import Browser, wait_for
 
 Play = Callable[..., Session]
@@ -109,6 +114,38 @@ def test_a_policy_is_steered_by_its_goal(play: Play, name: str) -> None:
         wait_for(lambda: goals.now("direction_w")[0].item() < -0.99)
         browser.set("Draw a new goal", True)
         wait_for(lambda: not goals.chosen)
+
+
+def test_the_page_does_not_move_a_slider_back_while_it_is_being_moved(play: Play) -> None:
+    session, shown, late = play("ase", "Steering"), [], []
+    server = viser.ViserServer("127.0.0.1", 0, verbose=False)
+    scene = Scene(server, session.env.scene.render_model())
+
+    def show(frame: Frame) -> None:
+        if late:
+            browser.set("Face (°)", late.pop())  # it comes between a command and what the page shows of it
+            wait_for(lambda: not loop._commands.empty())
+        page.show(frame)
+        shown.append(page._sliders["facing_w"].value)
+
+    loop = Loop(session, show)
+    page = Page(server, session, loop, scene, "tested")
+    loop.pause(True)
+    session.goals.face(math.radians(90))
+    try:
+        loop.do(lambda: None)
+        loop.tick()
+        assert shown == [90.0]
+        with Browser(f"http://127.0.0.1:{server.get_port()}") as browser:
+            browser.set("Face (°)", 0)
+            wait_for(lambda: not loop._commands.empty())
+            late.append(180)
+            loop.tick()
+            loop.tick()
+    finally:
+        server.stop()
+    assert shown == [90.0, 180.0, 180.0]
+    assert session.goals.now("facing_w").tolist() == pytest.approx([-1.0, 0.0])
 
 
 def test_a_policy_of_styles_offers_those_that_it_has_learned(play: Play) -> None:
