@@ -133,8 +133,9 @@ def controllability(evidence: Evidence) -> Outcome:
     p = scene.probabilities(held["window"])
     if scene.labelled:
         commanded = held["skill"]
-        label = scene.library.clip_skill[torch.tensor(scene.distinct)]
-        p = torch.zeros(len(p), len(scene.library.skills)).index_add_(1, label, p)
+        skills = len(scene.library.skills)
+        label = torch.cat((scene.library.clip_skill[torch.tensor(scene.distinct)], torch.tensor([skills])))
+        p = torch.zeros(len(p), skills + 1).index_add_(1, label, p)
     else:
         commanded = scene.number(held["clip"])
     return Outcome(

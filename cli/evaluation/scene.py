@@ -15,6 +15,7 @@ from murmillo.envs.metrics.classifier import Classifier, ClassifierConfig, train
 from murmillo.envs.metrics.coverage import positions
 from murmillo.envs.metrics.nearest import ClipMatcher
 from murmillo.envs.motion import MotionLibrary
+from murmillo.envs.observations import state_parts
 
 
 class Scene:
@@ -61,12 +62,17 @@ class Scene:
 
     @cached_property
     def classifier(self) -> Classifier:
-        """Trained on the distinct clips."""
+        """Trained on the distinct clips, and on their poses held still as a last class."""
         clips = [self.states[clip] for clip in self.distinct]
-        return train_classifier(clips, self.generator(), config=ClassifierConfig(frames=self._seen_at_once))
+        parts = state_parts(self.character)
+        velocities = torch.zeros(clips[0].shape[1], dtype=torch.bool)
+        for part in (parts.linear, parts.angular, parts.joint_velocities):
+            velocities[part] = True
+        config = ClassifierConfig(frames=self._seen_at_once)
+        return train_classifier(clips, self.generator(), config=config, velocities=velocities)
 
     def probabilities(self, window: Tensor) -> Tensor:
-        """[n, K] of the distinct clips, as the classifier sees the first frames of windows [n, WINDOW, D]."""
+        """[n, K + 1] of the distinct clips and of a held pose, from the first frames of windows [n, WINDOW, D]."""
         return self.classifier.probabilities(window[:, : self._seen_at_once])
 
     @property

@@ -21,12 +21,18 @@ class ClassifierConfig:
     Attributes:
         frames: that the network sees at once [control steps].
         held_out: share of a clip that accuracy is measured on.
+        jitter: what is added to a window that trains, of each feature's deviation and the same in all frames: a
+            character is never quite where its clip is, and one that stands has nothing else to be known by.
+        held: a window that differs by more from the pose in its middle, in mean squared deviations of its features, is
+            a motion; that pose, held still, is none.
         steps: of Adam, each on a batch in which every class is as likely.
         rate: of Adam, annealed to 0 along a cosine.
     """
 
     frames: int = 15
     held_out: float = 0.1
+    jitter: float = 0.3
+    held: float = 0.15
     hidden: int = 256
     dropout: float = 0.3
     steps: int = 800
@@ -37,10 +43,10 @@ class ClassifierConfig:
 
 @dataclass(frozen=True)
 class Classifier:
-    """A trained network, and how it did on the windows that it was not trained on.
+    """A network that was trained on all windows, and how one like it did that was not shown some of them.
 
     Attributes:
-        network: [n, F, D] states to [n, K] logits.
+        network: [n, F, D] states to [n, K] logits, or [n, K + 1] where a pose of a motion that is held is a class.
         classes: K.
         held_out_windows: how many there were.
         held_out_accuracy: mean over the classes that had any of the share seen as what they are; 1 / K by chance.
@@ -52,7 +58,7 @@ class Classifier:
     held_out_accuracy: float
 
     def probabilities(self, window: Tensor) -> Tensor:
-        """p(class | window) [n, K] of windows [n, F, D] of states."""
+        """p(class | window) [n, K] or [n, K + 1] of windows [n, F, D] of states; the last may be a held pose."""
         return _probabilities(self.network, window)
 
 
@@ -61,25 +67,29 @@ def train_classifier(
     generator: torch.Generator,
     label: Tensor | None = None,
     config: ClassifierConfig | None = None,
+    velocities: Tensor | None = None,
 ) -> Classifier:
     """Learn to tell the clips from short windows of them.
 
-    A stretch of each clip is held out, and no window that touches it is trained on: neighbouring windows share nearly
-    all their frames, so that random ones held out would measure memory. See `held_out_split`. The classifier that is
-    returned is the very one whose accuracy is given; it never saw the held-out stretches.
+    For the accuracy a stretch of each clip is held out, and no window that touches it is trained on: neighbouring
+    windows share nearly all their frames, so that random ones held out would measure memory. See `held_out_split`. The
+    classifier that is returned learned in the same way from all windows: a stretch of a strike is the strike itself.
 
     Args:
         clips: [F_c, D] states of each, a frame a control step; bit-identical clips should be given once.
         generator: decides the stretches, the initial weights and the order of training; nothing else does.
         label: [C] int64, the class of each clip; by default every clip is one.
+        velocities: [D] bool, which features are; told that, it learns a class of its own for poses that are held where
+            the clips move. Without it who freezes in the pose of a run is seen as running.
 
     Raises:
         SuiteError: a clip shorter than a window, or none long enough to hold anything out.
     """
     config = config or ClassifierConfig()
     label = torch.arange(len(clips)) if label is None else label
+    rates = torch.zeros(clips[0].shape[1:], dtype=torch.bool) if velocities is None else velocities
     classes = int(label.max()) + 1
-    trained, tested = [], []
+    everything, trained, tested = [], [], []
     for number, (clip, own) in enumerate(zip(clips, label.tolist(), strict=True)):
         if len(clip) < config.frames:
             raise SuiteError(
@@ -88,16 +98,20 @@ def train_classifier(
             )
         every = windows([clip], config.frames)
         train, held = held_out_split(len(clip), config.frames, config.held_out, generator)
+        everything.append((every, own))
         trained.append((every[train], own))
         tested.append((every[held], own))
-    window, target = _gather(trained)
     held_window, held_target = _gather(tested)
     if not len(held_target):
         raise SuiteError(
             f"windows of {config.frames} frames: no clip has room to hold one out; ask for shorter windows"
         )
-    network = _train(window, target, classes, config, int(torch.randint(2**62, (), generator=generator)))
-    accuracy = _balanced_accuracy(_probabilities(network, held_window), held_target)
+    seeds = torch.randint(2**62, (2,), generator=generator).tolist()
+    judged, network = (
+        _train(*_gather(part), rates, classes, config, seed)
+        for part, seed in zip((trained, everything), seeds, strict=True)
+    )
+    accuracy = _balanced_accuracy(_probabilities(judged, held_window), held_target)
     return Classifier(network, classes, len(held_target), accuracy)
 
 
@@ -110,7 +124,7 @@ def inception_score(probability: Tensor) -> float:
     for itself and 18.6 for ASE, on 160 clips and with a classifier of its own: compare scores of one classifier only.
 
     Args:
-        probability: [n, K] of windows of motion from random latents.
+        probability: [n, K] of windows of motion from random latents, or with what is no class, [n, K + 1].
     """
     p = probability.double()
     divergence = torch.xlogy(p, p) - torch.xlogy(p, p.mean(0))
@@ -124,7 +138,7 @@ def controllability(probability: Tensor, commanded: Tensor) -> float:
     (section 8.1), and is no more than that. 1 / K is chance; the clips' own windows give the most that can be expected.
 
     Args:
-        probability: [n, K].
+        probability: [n, K], or with what is no class, [n, K + 1].
         commanded: [n] int64, the class of the clip or label that each window should show.
     """
     return (probability.argmax(1) == commanded).double().mean().item()
@@ -159,17 +173,27 @@ def _gather(parts: list[tuple[Tensor, int]]) -> tuple[Tensor, Tensor]:
     return torch.cat([window for window, _ in parts]), torch.cat(target)
 
 
-def _train(window: Tensor, target: Tensor, classes: int, config: ClassifierConfig, seed: int) -> nn.Module:
-    """A perceptron that has learned the class of each window."""
+def _train(
+    window: Tensor, target: Tensor, rates: Tensor, classes: int, config: ClassifierConfig, seed: int
+) -> nn.Module:
+    """A perceptron that has learned the class of each window, and `classes` of poses held still if rates are known."""
+    scale, outputs = _Scale(window), classes + bool(rates.any())
+    if outputs > classes:
+        still = window[:, window.shape[1] // 2, None].masked_fill(rates, 0.0).expand_as(window)
+        still = still[((window - still) / scale.deviation).square().mean((1, 2)) > config.held]
+        window = torch.cat((window, still))
+        target = torch.cat((target, target.new_full((len(still),), classes)))
     balanced = 1.0 / target.bincount()[target]
     with torch.random.fork_rng(devices=[]):  # layers and dropout draw from torch's own generator
         torch.manual_seed(seed)
-        network = _network(window, classes, config)
+        network = _network(scale, window[0].numel(), outputs, config)
+        jitter = config.jitter * scale.deviation.masked_fill(rates, 0.0)
         optimiser = torch.optim.AdamW(network.parameters(), config.rate, weight_decay=config.weight_decay)
         schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, config.steps)
         for _ in range(config.steps):
             batch = torch.multinomial(balanced, config.batch, replacement=True)
-            loss = F.cross_entropy(network(window[batch]), target[batch])
+            moved = window[batch] + jitter * torch.randn(config.batch, 1, window.shape[-1])
+            loss = F.cross_entropy(network(moved), target[batch])
             optimiser.zero_grad()
             loss.backward()
             optimiser.step()
@@ -177,12 +201,12 @@ def _train(window: Tensor, target: Tensor, classes: int, config: ClassifierConfi
     return network.eval()
 
 
-def _network(window: Tensor, classes: int, config: ClassifierConfig) -> nn.Module:
+def _network(scale: "_Scale", inputs: int, classes: int, config: ClassifierConfig) -> nn.Module:
     return nn.Sequential(
-        _Scale(window),
+        scale,
         nn.Flatten(),
         nn.Dropout(config.dropout),
-        nn.Linear(window[0].numel(), config.hidden),
+        nn.Linear(inputs, config.hidden),
         nn.ReLU(),
         nn.Dropout(config.dropout),
         nn.Linear(config.hidden, classes),

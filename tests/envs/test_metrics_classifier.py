@@ -71,6 +71,36 @@ def test_it_knows_clips_that_differ(classifier: Classifier) -> None:
     assert controllability(probability, torch.full((56,), 3)) > 0.9
 
 
+def test_the_classifier_that_is_given_has_seen_all_of_every_clip() -> None:
+    """Each quarter of a clip is a pose of its own: who was not shown one can only guess what it is of."""
+    generator = torch.Generator().manual_seed(0)
+    clips = [torch.randn(4, 6, generator=generator).repeat_interleave(10, 0) for _ in range(5)]
+    found = train_classifier(clips, torch.Generator().manual_seed(1), config=replace(QUICK, held_out=0.25))
+    assert found.held_out_accuracy < 0.8
+    seen = controllability(found.probabilities(windows(clips, 5)), torch.arange(5).repeat_interleave(36))
+    assert seen > 0.85
+
+
+def test_a_pose_that_is_held_is_none_of_the_motions_and_one_of_the_stands() -> None:
+    """Poses and their velocities of three clips that swing and one that stands: who freezes in a swing shows none."""
+    generator = torch.Generator().manual_seed(0)
+    pose, time = torch.randn(4, 1, 4, generator=generator), torch.linspace(0.0, 20.0, 100)[:, None] + torch.arange(4)
+    swing = torch.tensor([0.5, 0.5, 0.5, 0.0])[:, None, None]
+    clips = list(torch.cat((pose + swing * torch.sin(time), swing * torch.cos(time)), -1))
+    velocities = torch.arange(8) >= 4
+    config = replace(QUICK, frames=9, hidden=64, steps=400)
+    frozen = windows(clips, 9)[:, 4:5].masked_fill(velocities, 0.0).repeat(1, 9, 1)
+
+    def seen(velocities: Tensor | None, window: Tensor) -> Tensor:
+        found = train_classifier(clips, torch.Generator().manual_seed(1), config=config, velocities=velocities)
+        return found.probabilities(window).argmax(1).unflatten(0, (4, 92))
+
+    assert (seen(velocities, frozen)[:3] == 4).float().mean() > 0.95
+    assert (seen(velocities, frozen)[3] == 3).all()
+    assert (seen(velocities, windows(clips, 9)) == torch.arange(4)[:, None]).float().mean() > 0.95
+    assert (seen(None, frozen)[:3] == torch.arange(3)[:, None]).float().mean() > 0.8  # what it guards against
+
+
 def test_clips_of_noise_are_told_apart_by_chance_alone() -> None:
     """By a network that could learn every window by heart: held-out windows that it had seen, it would know.
 
