@@ -21,10 +21,12 @@ _LOOP = 1.0
 """Weighted squares by which a clip's beginning may differ from its end for it to begin there again."""
 _REST = 0.2
 """Weighted squares by which a pose may differ from a clip's first or last and still be taken for rest."""
-_PACES = (1.0, 0.0, 2.0)
-"""Of a clip's clock: as time goes, waiting for a character that is behind, following one that is ahead."""
-_NEARER = 0.7
-"""A clip waits or hurries where its error is then less than this of what it would be."""
+_LOOK = (-12, -9, -6, -4, -2, 0, 1, 2, 4, 6, 9, 12)
+"""Control steps from now, the moments of a clip of which the one is looked for that the character is nearest to."""
+_GOES_ON = _LOOK.index(1)
+_NEARER, _ALIKE = 0.7, 0.5
+"""A clip waits or hurries where the weighted squares are less than this of what they are when it goes on, and by more
+than this: who stands still is a little nearer to the step before, and far nearer to what lies ten steps back."""
 _WAITED = 0.3
 """What is left of the reward while the clip waits: who stays where it is has not followed."""
 
@@ -65,6 +67,7 @@ class Tracker:
     goes on where it is most like its end, which of the built-in ones is their beginning, or gives way to another skill.
     Rest at a clip's beginning and end is passed over: who sees only its state cannot tell the one from the other. For
     the same reason a clip waits for whoever is behind, which is then paid less, and hurries after whoever is ahead.
+    Who stands still while the clip moves is behind, however near to it.
 
     What is compared is `character_state`, so that neither place nor heading count, but the speeds do.
     """
@@ -131,30 +134,35 @@ class Tracker:
 
     def wanted(self, ahead: float | Tensor) -> tuple[Tensor, Tensor]:
         """Poses [N, nq] and velocities [N, nv] of the clips so much later than now [s], a number or [N]."""
-        clip, time = self._clip, self._time.clamp_min(0.0) + ahead
-        later = torch.where(time > self._last[clip], self._again[clip] + time - self._last[clip], time)
-        return self._library.pose(clip, torch.maximum(later, self._first[clip]))
+        return self._library.pose(self._clip, self._within(self._time.clamp_min(0.0) + ahead))
+
+    def _within(self, time: Tensor) -> Tensor:
+        """Moments [..., N] [s] of the clips: after the end from where they begin again on, the first before that."""
+        first, last, again = (ends[self._clip] for ends in (self._first, self._last, self._again))
+        return torch.maximum(torch.where(time > last + _ON_TIME, again + time - last, time), first)
 
     def _nearest(self, state: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """A control step on, at the pace that keeps the clip nearest to the character.
+        """A control step on, at the pace that brings the clip to where it is nearest to the character.
 
         A policy sees no clock: were the clip's to run on, one that is late would never be right again.
 
         Returns:
             time [N] [s]; weighted squares [4, N] of the errors; mean distance of the key points [N] [m].
         """
-        times = self._time + CONTROL_DT * torch.tensor(_PACES, dtype=torch.float64).unsqueeze(-1)
+        look, worlds = torch.tensor(_LOOK), torch.arange(len(state))
+        times = self._time + CONTROL_DT * look.double().unsqueeze(-1)
         clips = self._clip.expand_as(times)
-        wanted = self._library.frames(clips.flatten(), times.flatten().clamp_min(0.0), 1)[:, 0]
+        wanted = self._library.frames(clips.flatten(), self._within(times).flatten(), 1)[:, 0]
         error = state - wanted.unflatten(0, times.shape)
         if self._library.mask is not None:
             error = error.masked_fill(self._library.mask[self._clip], 0.0)
         squares = torch.stack(_squares(error, self._parts))
-        distance = error[..., self._parts.keys].unflatten(-1, (-1, 3)).norm(dim=-1).mean(-1)
         apart = squares.sum(0)
-        apart[0] *= _NEARER
-        chosen, worlds = apart.argmin(0), torch.arange(len(state))
-        return times[chosen, worlds], squares[:, chosen, worlds], distance[chosen, worlds]
+        apart[_GOES_ON] = _NEARER * apart[_GOES_ON] - _ALIKE
+        pace = torch.where(self._time < self._first[self._clip], 1, look[apart.argmin(0)].clamp(0, 2))
+        chosen = _GOES_ON - 1 + pace
+        distance = error[chosen, worlds][:, self._parts.keys].unflatten(-1, (-1, 3)).norm(dim=-1).mean(-1)
+        return times[chosen, worlds], squares[:, chosen, worlds], distance
 
     def _end(self, generator: torch.Generator) -> None:
         """Where clips are over they begin again, or other skills are commanded."""

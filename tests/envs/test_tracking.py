@@ -144,9 +144,25 @@ def test_how_long_a_clip_has_waited_is_a_part_of_the_state(character, library, g
 def test_a_clip_hurries_after_who_is_ahead(character, library, generator):
     follower, _ = tracker(character, library, [KICK])
     follower.begin(torch.tensor([0]), torch.tensor([KICK]), torch.tensor([0.5], dtype=torch.float64))
-    for step in range(1, 8):
-        reward, _ = follower.step(at(library, KICK, 0.6 + step * CONTROL_DT), generator)
-    assert reward.item() == pytest.approx(1.0, abs=1e-3)
+    paid = [follower.step(at(library, KICK, 0.75 + step * CONTROL_DT), generator)[0].item() for step in range(1, 10)]
+    assert paid[0] < 0.6
+    assert paid[-1] > 0.9  # it need not be there to the last step
+
+
+@pytest.mark.parametrize("clip", [KICK, TAUNT])
+def test_who_stands_still_is_behind_wherever_in_the_clip(character, library, generator, clip: int):
+    """A clip that went on by what is nearest a step away would pay it, since no step makes it much worse."""
+    begins = torch.arange(0.4, library.duration[clip].item() - 0.5, 0.1, dtype=torch.float64)
+    follower, _ = tracker(character, library, [clip] * len(begins))
+    follower.begin(torch.arange(len(begins)), torch.full((len(begins),), clip), begins)
+    stays = library.frames(torch.full((len(begins),), clip), begins, 1)[:, 0]
+    stays[:, 7:13] = 0.0
+    lost = torch.stack([follower.step(stays, generator)[1] for _ in range(60)])
+    assert lost.any(0).float().mean() > 0.9
+    follower, _ = tracker(character, library, [GUARD])  # unless the clip itself stands still
+    follower.begin(torch.tensor([0]), torch.tensor([GUARD]), torch.tensor([1.5], dtype=torch.float64))
+    stays = at(library, GUARD, 1.5)
+    assert not any(follower.step(stays, generator)[1] for _ in range(60))
 
 
 def test_what_a_clip_says_nothing_of_is_left_out(character, generator):
@@ -199,7 +215,7 @@ def test_patience_ends(character, library, generator):
     far = at(library, KICK, 0.0).clone()
     far[:, state_parts(character).keys] += 0.3
     lost = [bool(follower.step(far, generator)[1]) for _ in range(30)]
-    assert lost.index(True) == pytest.approx((0.5 + 0.3) / CONTROL_DT, abs=1)
+    assert 0.5 < lost.index(True) * CONTROL_DT < 0.5 + 0.35  # the clip has begun by then, and may have hurried
 
 
 def test_at_its_end_a_clip_begins_again_or_gives_way_to_another(character, library, generator):
@@ -270,7 +286,7 @@ def test_with_residual_forces_the_guide_keeps_balance():
             _, _, terminated, _, _ = env.step(env.guide())
             standing &= ~terminated
         lengths.append(standing.mean())
-    assert lengths[0] < 0.5
+    assert lengths[0] < 0.7
     assert lengths[1] == 1.0
 
 
