@@ -52,8 +52,9 @@ def _check_followed(config: TrainConfig) -> None:
     uses = {"runner.reward_weights.tracking": weight, "guided_start.rounds": config.guided_start.rounds}
     uses["agent.assistance.follows"] = getattr(getattr(config.agent, "assistance", None), "follows", 0.0)
     used = [f"{name}={value:g}" for name, value in uses.items() if value]
-    if used and not config.env.tracking.follow:
-        raise CommandError(f"{used[0]}: nobody follows a clip; set env.tracking.follow=true")
+    needed = used + ["agent.critic_progress=true"] * getattr(config.agent, "critic_progress", False)
+    if needed and not config.env.tracking.follow:
+        raise CommandError(f"{needed[0]}: nobody follows a clip; set env.tracking.follow=true")
     if config.env.tracking.follow and not used:
         raise CommandError(
             "env.tracking.follow=true: nothing uses the clips that are followed; give them a weight, "

@@ -11,6 +11,9 @@ from murmillo.envs.motion import MotionLibrary
 from murmillo.envs.observations import StateParts, state_parts
 from murmillo.envs.skills import CommandedSkills
 
+PROGRESS_SIZE = 9
+"""Numbers of `Tracker.progress`."""
+
 _ON_TIME = 1e-9
 """[s] by which times that are meant to be one may differ."""
 _SEAM = 0.5
@@ -29,6 +32,8 @@ _NEARER, _ALIKE = 0.7, 0.5
 than this: who stands still is a little nearer to the step before, and far nearer to what lies ten steps back."""
 _WAITED = 0.3
 """What is left of the reward while the clip waits: who stays where it is has not followed."""
+
+_OWN_STATE = ("clip", "time", "held", "error")
 
 
 @dataclass
@@ -86,6 +91,7 @@ class Tracker:
         self._time = torch.zeros(num_envs, dtype=torch.float64)
         self._held = torch.zeros(num_envs, dtype=torch.float64)
         self._character = character
+        self._error = torch.zeros(num_envs, 5)
         spans = [self._span(clip) for clip in range(len(library.clips))]
         self._first, self._last, self._again = torch.tensor(spans, dtype=torch.float64).unbind(-1)
 
@@ -94,11 +100,13 @@ class Tracker:
         latest = self._last[clip] - CONTROL_DT
         self._held[env_ids] = 0.0
         self._clip[env_ids], self._time[env_ids] = clip, torch.minimum(torch.maximum(time, self._first[clip]), latest)
+        self._error[env_ids] = torch.tensor([1.0, 1.0, 1.0, 1.0, 0.0])
 
     def turn(self, env_ids: Tensor, generator: torch.Generator) -> None:
         """These worlds [n] are to come to the beginning of a clip of their skill, wherever they are."""
         self._clip[env_ids], _ = self._library.sample(len(env_ids), generator, self._skills.current[env_ids])
         self._time[env_ids], self._held[env_ids] = -self._config.patience, 0.0
+        self._error[env_ids] = 0.0
 
     def step(self, state: Tensor, generator: torch.Generator) -> tuple[Tensor, Tensor]:
         """One control step further; what the worlds do and are commanded next.
@@ -117,7 +125,9 @@ class Tracker:
         first = self._first[self._clip]
         before, begun = self._time, self._time >= first - _ON_TIME
         self._time, squares, distance = self._nearest(state)
-        reward = (torch.tensor([[0.4], [0.2], [0.2], [0.2]]) * _likeness(squares)).sum(0)
+        likeness = _likeness(squares)
+        self._error = torch.cat((likeness, distance.unsqueeze(0))).T
+        reward = (torch.tensor([[0.4], [0.2], [0.2], [0.2]]) * likeness).sum(0)
         reward = torch.where(self._time > before, reward, _WAITED * reward)
         held = torch.where(self._time > before, -CONTROL_DT, CONTROL_DT)
         self._held = torch.where(begun, (self._held + held).clamp_min(0.0), 0.0)
@@ -126,6 +136,20 @@ class Tracker:
         self._time = torch.where(there, first, self._time)
         self._end(generator)
         return reward, lost
+
+    @property
+    def progress(self) -> Tensor:
+        """[N, 9] what following pays for and a state does not show, for critics.
+
+        They are the four exponentials of the last step's errors, in [0, 1], and the distance of the key points [m]; the
+        sine and cosine of where in the clip the character should be; for how long the clip has waited [s], and how long
+        it will before it begins in any case [s].
+        """
+        first, last = self._first[self._clip], self._last[self._clip]
+        angle = 2 * torch.pi * (self._time - first) / (last - first)
+        begins = torch.where(self._time < first, (-self._time).clamp_min(CONTROL_DT), 0.0)
+        clock = torch.stack((angle.sin(), angle.cos(), self._held, begins), -1)
+        return torch.cat((self._error, clock.float()), -1)
 
     @property
     def waited(self) -> Tensor:
@@ -193,10 +217,11 @@ class Tracker:
         return torch.stack(_squares(states - other, self._parts)).sum(0)
 
     def state_dict(self) -> dict[str, Tensor]:
-        return {"clip": self._clip.clone(), "time": self._time.clone(), "held": self._held.clone()}
+        return {name: getattr(self, f"_{name}").clone() for name in _OWN_STATE}
 
     def load_state_dict(self, state: dict[str, Tensor]) -> None:
-        self._clip, self._time, self._held = (state[name].clone() for name in ("clip", "time", "held"))
+        for name in _OWN_STATE:
+            setattr(self, f"_{name}", state[name].clone())
 
 
 def _squares(error: Tensor, parts: StateParts) -> tuple[Tensor, Tensor, Tensor, Tensor]:

@@ -31,7 +31,7 @@ from murmillo.envs.starts import FALLEN, KINDS, RECOVERY, REFERENCE, StartSample
 from murmillo.envs.tasks import Imitation, Task
 from murmillo.envs.tasks.goals import uniform
 from murmillo.envs.terrain import make_terrain
-from murmillo.envs.tracking import Tracker
+from murmillo.envs.tracking import PROGRESS_SIZE, Tracker
 
 RENDERED_WORLDS = 16
 
@@ -323,6 +323,8 @@ class HumanoidVectorEnv(VectorEnv):
 
     def _set_spaces(self) -> None:
         observations = {**self._observer.spaces(), "skill": gymnasium.spaces.Discrete(len(self.skills))}
+        if self.config.tracking.follow:
+            observations["progress"] = box((PROGRESS_SIZE,))
         if self.task.goal_dim:
             observations["goal"] = box((self.task.goal_dim,))
         self._action_dim = self.character.action_dim + self.residual_dim
@@ -391,6 +393,8 @@ class HumanoidVectorEnv(VectorEnv):
 
     def _observation(self) -> dict[str, Tensor]:
         observation = {**self._observer.observation(self._steps), "skill": self._skills.current.clone()}
+        if self._tracker is not None:
+            observation["progress"] = self._tracker.progress
         if self.task.goal_dim:
             observation["goal"] = self.task.goal(self.state)
         return observation

@@ -1,6 +1,6 @@
 """Policy and critic of the methods whose policies are told latents or labels; with a base, an adaptation of it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import torch
@@ -15,6 +15,9 @@ from murmillo.agents.common.heights import HEIGHTS, HeightMapEncoder, check_map
 from murmillo.agents.common.networks import CONDITION, Critic, Told, by_name
 from murmillo.agents.common.ppo import ActorCritic, Minibatch, PPOConfig, gaussian_policy
 
+PROGRESS, PROGRESS_SIZE = "progress", 9
+"""The observation of how a clip is followed, for critics."""
+
 
 @dataclass
 class SkillConfig(AdaptationConfig):
@@ -22,8 +25,11 @@ class SkillConfig(AdaptationConfig):
 
     Attributes:
         ppo: policy and critic.
+        critic_progress: whether the critic is shown how far along which clip each world is and how well it follows it
+            (`env.tracking`), of which the state says little and the reward depends on; the policy never is.
     """
 
+    critic_progress: bool = False
     ppo: PPOConfig = field(default_factory=PPOConfig)
 
 
@@ -63,7 +69,8 @@ class SkillModel(ActorCritic):
             AgentError: the base does not fit the environment or the config.
         """
         if base is None:
-            super().__init__(state_dim, action_dim, condition_dim, config.ppo, generator)
+            critic = SightedCritic(state_dim, condition_dim, config, generator) if config.critic_progress else None
+            super().__init__(state_dim, action_dim, condition_dim, config.ppo, generator, critic=critic)
         else:
             plain = gaussian_policy(state_dim, action_dim, condition_dim, config.ppo, generator)
             maps = _shows_heights(env)
@@ -72,7 +79,7 @@ class SkillModel(ActorCritic):
             policy, views = base.adapted(
                 plain, state_dim, lambda own: Adapter(own, config.adapter, generator, control, size)
             )
-            critic = SightedCritic(state_dim, condition_dim, config.ppo.hidden, generator, other)
+            critic = SightedCritic(state_dim, condition_dim, config, generator, other)
             super().__init__(
                 state_dim,
                 action_dim,
@@ -84,6 +91,8 @@ class SkillModel(ActorCritic):
                 state_normalizer=views,
             )
             self.seen = (HEIGHTS,) if maps else ()
+        if config.critic_progress and _shows(env, PROGRESS):
+            self.seen = (*self.seen, PROGRESS)
         self._config = config
 
     @property
@@ -107,34 +116,45 @@ class SkillModel(ActorCritic):
 
 
 class SightedCritic(nn.Module):
-    """A critic that sees the newest of several `Views`, and the map of heights where there is one."""
+    """A critic that sees the newest of several `Views`, the map of heights if there is one, and progress if asked to.
+
+    Who plays a policy follows no clip, and does not ask its critic.
+    """
 
     def __init__(
         self,
         state_dim: int,
         condition_dim: int,
-        hidden: Sequence[int],
+        config: SkillConfig,
         generator: torch.Generator,
-        control: HeightMapEncoder | None,
+        control: HeightMapEncoder | None = None,
     ) -> None:
         super().__init__()
         self.state_dim = state_dim
         self.control = control
-        width = condition_dim + (0 if control is None else control.size)
-        self.critic = Critic(state_dim, width, hidden, generator)
+        self.progress = config.critic_progress
+        width = condition_dim + (0 if control is None else control.size) + (PROGRESS_SIZE if self.progress else 0)
+        self.critic = Critic(state_dim, width, config.ppo.hidden, generator)
 
     def forward(self, state: Tensor, told: Told) -> Tensor:
         """`[...]` from normalised states `[..., V D]` and what is told."""
-        condition = by_name(told)[CONDITION]
+        parts = by_name(told)
+        condition = parts[CONDITION]
         if self.control is not None:
             condition = torch.cat([condition, self.control(told)], -1)
+        if self.progress:
+            condition = torch.cat([condition, parts[PROGRESS]], -1)
         return self.critic(state[..., -self.state_dim :], condition)
 
 
 def _shows_heights(env: VectorEnv) -> bool:
     """Whether the environment shows a map of heights; an AgentError where that is of another size than is read."""
-    space = env.single_observation_space
-    if not isinstance(space, spaces.Dict) or HEIGHTS not in space.spaces:
+    if not _shows(env, HEIGHTS):
         return False
-    check_map(tuple(space[HEIGHTS].shape or ()))
+    check_map(tuple(env.single_observation_space[HEIGHTS].shape or ()))  # type: ignore[index] # a Dict, as just seen
     return True
+
+
+def _shows(env: VectorEnv, name: str) -> bool:
+    space = env.single_observation_space
+    return isinstance(space, spaces.Dict) and name in space.spaces

@@ -148,6 +148,8 @@ def test_a_wrong_word_is_named_in_one_line(word: str, parts: tuple[str, ...]) ->
         (["+runner.reward_weights.residual=0.1"], ("runner.reward_weights.residual=0.1", "env.residual_force")),
         (["+runner.reward_weights.tracking=2"], ("runner.reward_weights.tracking=2", "env.tracking.follow=true")),
         (["guided_start.rounds=2"], ("guided_start.rounds=2", "env.tracking.follow=true")),
+        (["agent.critic_progress=true"], ("agent.critic_progress=true", "env.tracking.follow=true")),
+        (["agent.critic_progress=true", "env.tracking.follow=true"], ("nothing uses the clips", "guided_start.rounds")),
         (
             ["env.tracking.follow=true"],
             ("env.tracking.follow=true", "+runner.reward_weights.tracking=3", "guided_start.rounds"),

@@ -7,12 +7,15 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 import torch
+from torch import Tensor
 
 from murmillo.agents.common.exactness import WORDS
 from murmillo.agents.common.runner import Runner
+from murmillo.agents.common.skill_model import SightedCritic
 from murmillo.cli import gl
 from tests.cli.running import interrupted, rows
 
@@ -85,6 +88,29 @@ def test_ablations_train(murmillo: Murmillo, folder: Path, tiny: tuple[str, ...]
     status, _, err = murmillo("train", *tiny, f"ablation={ablation}", "runner.samples=64", "run.name=less")
     assert status == 0, err
     assert ("reward/skill" in rows(folder / "runs" / "less")[0]) == (ablation != "no_skill_discovery")
+
+
+def test_a_run_whose_critic_sees_progress_is_taken_up_again_and_played_where_nobody_follows(
+    murmillo: Murmillo, folder: Path, tiny: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen, value = [], SightedCritic.forward
+
+    def noted(critic: SightedCritic, state: Tensor, told: Any) -> Tensor:
+        seen.append(told["progress"].shape[-1])
+        return value(critic, state, told)
+
+    monkeypatch.setattr(SightedCritic, "forward", noted)
+    follows = ("env.tracking.follow=true", "+runner.reward_weights.tracking=2", "agent.critic_progress=true")
+    status, _, err = murmillo("train", *tiny, *follows, "runner.samples=64", "run.name=follows")
+    assert status == 0, err
+    status, _, err = murmillo("train", "run.resume=runs/follows", "runner.samples=128")
+    assert status == 0, err
+    assert set(seen) == {9}
+    assert [row["samples"] for row in rows(folder / "runs" / "follows")] == ["64", "128"]
+    known = len(seen)
+    status, _, err = murmillo("evaluate", "run=runs/follows", "worlds=4")
+    assert status == 0, err
+    assert len(seen) == known
 
 
 @pytest.mark.parametrize("matmul", ["tf32", "bf16"])

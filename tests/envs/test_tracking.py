@@ -13,7 +13,7 @@ from murmillo.envs.character import CONTROL_DT, Character, load_character
 from murmillo.envs.motion import MotionLibrary, load_clips
 from murmillo.envs.observations import character_state, state_parts
 from murmillo.envs.skills import CommandedSkills
-from murmillo.envs.tracking import Tracker, TrackingConfig
+from murmillo.envs.tracking import PROGRESS_SIZE, Tracker, TrackingConfig
 
 CLIPS = ("guard", "kick", "taunt")
 GUARD, KICK, TAUNT = range(3)  # of clips and of skills alike
@@ -163,6 +163,25 @@ def test_who_stands_still_is_behind_wherever_in_the_clip(character, library, gen
     follower.begin(torch.tensor([0]), torch.tensor([GUARD]), torch.tensor([1.5], dtype=torch.float64))
     stays = at(library, GUARD, 1.5)
     assert not any(follower.step(stays, generator)[1] for _ in range(60))
+
+
+def test_critics_are_shown_what_following_pays_for_and_no_state_shows(character, library, generator):
+    follower, _ = tracker(character, library, [KICK])
+    follower.begin(torch.tensor([0]), torch.tensor([KICK]), torch.tensor([0.5], dtype=torch.float64))
+    assert follower.progress.shape == (1, PROGRESS_SIZE)
+    follower.step(at(library, KICK, 0.5 + CONTROL_DT), generator)
+    near = follower.progress[0]
+    assert near[:4].tolist() == pytest.approx([1.0] * 4, abs=1e-3)
+    assert near[4].item() == pytest.approx(0.0, abs=1e-3)
+    assert near[5:7].square().sum().item() == pytest.approx(1.0)
+    assert near[7:].tolist() == [0.0, 0.0]
+    for _ in range(8):
+        reward, _ = follower.step(at(library, KICK, 0.5), generator)
+    waits = follower.progress[0]
+    assert waits[7] > 3 * CONTROL_DT
+    assert (waits[:4] * torch.tensor([0.4, 0.2, 0.2, 0.2])).sum().item() * 0.3 == pytest.approx(reward.item())
+    follower.turn(torch.tensor([0]), generator)
+    assert follower.progress[0, 8].item() == pytest.approx(1.0)  # of patience
 
 
 def test_what_a_clip_says_nothing_of_is_left_out(character, generator):
