@@ -82,7 +82,7 @@ class Assistance(nn.Module):
         if config.fade and not columns:
             raise AgentError(
                 f"agent.assistance.fade={config.fade}: there are no residual forces; "
-                "set env.residual_force=50, or this to 0"
+                "set env.residual_force=20, or this to 0"
             )
         self._forces = torch.arange(actions) >= actions - columns if columns else None
         self.register_buffer("share", torch.ones(skills))
