@@ -24,7 +24,7 @@ class ClassifierConfig:
         jitter: what is added to a window that trains, of each feature's deviation and the same in all frames: a
             character is never quite where its clip is, and one that stands has nothing else to be known by.
         held: a window that differs by more from the pose in its middle, in mean squared deviations of its features, is
-            a motion; that pose, held still, is none.
+            a motion; that pose, held still, is none, unless it is as near to the pose of a clip that stands.
         steps: of Adam, each on a batch in which every class is as likely.
         rate: of Adam, annealed to 0 along a cosine.
     """
@@ -179,8 +179,7 @@ def _train(
     """A perceptron that has learned the class of each window, and `classes` of poses held still if rates are known."""
     scale, outputs = _Scale(window), classes + bool(rates.any())
     if outputs > classes:
-        still = window[:, window.shape[1] // 2, None].masked_fill(rates, 0.0).expand_as(window)
-        still = still[((window - still) / scale.deviation).square().mean((1, 2)) > config.held]
+        still = _held_poses(window, target, rates, scale, config.held)
         window = torch.cat((window, still))
         target = torch.cat((target, target.new_full((len(still),), classes)))
     balanced = 1.0 / target.bincount()[target]
@@ -199,6 +198,21 @@ def _train(
             optimiser.step()
             schedule.step()
     return network.eval()
+
+
+def _held_poses(window: Tensor, target: Tensor, rates: Tensor, scale: "_Scale", held: float) -> Tensor:
+    """Windows [m, F, D] of poses at rest, each the middle of a window of its motion, that no stand is like.
+
+    A class whose windows hardly move, most of them, is a stand.
+    """
+    pose = window[:, window.shape[1] // 2].masked_fill(rates, 0.0)
+    moves = ((window - pose.unsqueeze(1)) / scale.deviation).square().mean((1, 2)) > held
+    stands = moves.double().new_zeros(int(target.max()) + 1).index_add_(0, target, (~moves).double())
+    stand = pose[~moves & (stands > 0.5 * target.bincount())[target]]
+    if len(stand):
+        apart = torch.cdist(pose / scale.deviation, stand / scale.deviation).amin(1).square() / pose.shape[1]
+        moves &= apart > held
+    return pose[moves].unsqueeze(1).expand(-1, window.shape[1], -1)
 
 
 def _network(scale: "_Scale", inputs: int, classes: int, config: ClassifierConfig) -> nn.Module:

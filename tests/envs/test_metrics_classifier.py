@@ -101,6 +101,22 @@ def test_a_pose_that_is_held_is_none_of_the_motions_and_one_of_the_stands() -> N
     assert (seen(None, frozen)[:3] == torch.arange(3)[:, None]).float().mean() > 0.8  # what it guards against
 
 
+def test_who_rests_where_a_clip_stands_is_seen_to_stand() -> None:
+    """Twelve clips swing through the pose in which the last one stands, nearly still."""
+    generator = torch.Generator().manual_seed(0)
+    time = torch.linspace(0.0, 20.0, 100)[:, None]
+    pose = torch.randn(1, 4, generator=generator)
+    swings = [torch.randn(1, 4, generator=generator) for _ in range(12)]
+    moves = [torch.cat((pose + torch.sin(time) * swing, torch.cos(time) * swing), -1) for swing in swings]
+    stands = torch.cat((pose + 0.02 * torch.sin(time), torch.zeros(100, 4)), -1)
+    clips, velocities = [*moves, stands], torch.arange(8) >= 4
+    config = replace(QUICK, frames=9, hidden=64, steps=400)
+    found = train_classifier(clips, torch.Generator().manual_seed(1), config=config, velocities=velocities)
+    rest = torch.cat((pose + 0.1 * torch.randn(200, 4, generator=generator), torch.zeros(200, 4)), -1)
+    seen = found.probabilities(rest.unsqueeze(1).expand(-1, 9, -1)).argmax(1)
+    assert (seen == 12).float().mean() > 0.97
+
+
 def test_clips_of_noise_are_told_apart_by_chance_alone() -> None:
     """By a network that could learn every window by heart: held-out windows that it had seen, it would know.
 
