@@ -13,6 +13,9 @@ from torch import Tensor, nn
 from murmillo.envs.errors import SuiteError
 from murmillo.envs.metrics.windows import windows
 
+_AT_ONCE = 4096
+"""Windows, so that long libraries fit into memory."""
+
 
 @dataclass(frozen=True)
 class ClassifierConfig:
@@ -210,8 +213,9 @@ def _held_poses(window: Tensor, target: Tensor, rates: Tensor, scale: "_Scale", 
     stands = moves.double().new_zeros(int(target.max()) + 1).index_add_(0, target, (~moves).double())
     stand = pose[~moves & (stands > 0.5 * target.bincount())[target]]
     if len(stand):
-        apart = torch.cdist(pose / scale.deviation, stand / scale.deviation).amin(1).square() / pose.shape[1]
-        moves &= apart > held
+        parts, stand = (pose / scale.deviation).split(_AT_ONCE), stand / scale.deviation
+        apart = torch.cat([torch.cdist(part, stand).amin(1) for part in parts])
+        moves &= apart.square() / pose.shape[1] > held
     return pose[moves].unsqueeze(1).expand(-1, window.shape[1], -1)
 
 
@@ -250,4 +254,4 @@ def _balanced_accuracy(probability: Tensor, target: Tensor) -> float:
 
 def _probabilities(network: nn.Module, window: Tensor) -> Tensor:
     with torch.no_grad():
-        return torch.cat([network(batch).softmax(-1) for batch in window.split(4096)])
+        return torch.cat([network(batch).softmax(-1) for batch in window.split(_AT_ONCE)])
