@@ -146,7 +146,7 @@ class Tracker:
         it will before it begins in any case [s].
         """
         first, last = self._first[self._clip], self._last[self._clip]
-        angle = 2 * torch.pi * (self._time - first) / (last - first)
+        angle = 2 * torch.pi * (self._time - first) / (last - first).clamp_min(CONTROL_DT)
         begins = torch.where(self._time < first, (-self._time).clamp_min(CONTROL_DT), 0.0)
         clock = torch.stack((angle.sin(), angle.cos(), self._held, begins), -1)
         return torch.cat((self._error, clock.float()), -1)

@@ -22,7 +22,7 @@ from murmillo.envs.forces import OutsideForces
 from murmillo.envs.guide import Guide
 from murmillo.envs.motion import MotionLibrary, load_clips
 from murmillo.envs.motion.demonstrations import Demonstrations
-from murmillo.envs.observer import Observer, box
+from murmillo.envs.observer import LIMIT, Observer, box
 from murmillo.envs.physics import Physics, State, make_physics
 from murmillo.envs.rendering import FrameRenderer, Window, make_screen
 from murmillo.envs.scene import Scene, slippery
@@ -396,7 +396,7 @@ class HumanoidVectorEnv(VectorEnv):
     def _observation(self) -> dict[str, Tensor]:
         observation = {**self._observer.observation(self._steps), "skill": self._skills.current.clone()}
         if self._tracker is not None:
-            observation["progress"] = self._tracker.progress
+            observation["progress"] = self._tracker.progress.clamp(-LIMIT, LIMIT)
         if self.task.goal_dim:
             observation["goal"] = self.task.goal(self.state)
         return observation
