@@ -132,9 +132,10 @@ def test_how_long_a_clip_has_waited_is_a_part_of_the_state(character, library, g
         follower.begin(torch.tensor([0]), torch.tensor([KICK]), torch.tensor([0.5], dtype=torch.float64))
         for step in range(14):
             if step == saved:
-                state = follower.state_dict()
+                state, progress = follower.state_dict(), follower.progress
                 follower, _ = tracker(character, library, [KICK], patience=0.5)
                 follower.load_state_dict(state)
+                assert torch.equal(follower.progress, progress)
             follower.step(stays, generator)
         states.append(follower.state_dict())
     assert states[0]["held"] > 0.3
