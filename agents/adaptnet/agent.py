@@ -15,11 +15,10 @@ from murmillo.agents.common.base import MERGED, Base
 from murmillo.agents.common.blending import Blending, another_base
 from murmillo.agents.common.discriminator import Windows
 from murmillo.agents.common.errors import AgentError
-from murmillo.agents.common.exploration import ActionNoise
 from murmillo.agents.common.interface import Demonstrations, Obs, Step
 from murmillo.agents.common.masks import FeatureMasks
 from murmillo.agents.common.networks import Told
-from murmillo.agents.common.ppo import PPO, Minibatch
+from murmillo.agents.common.ppo import PPO, Minibatch, action_noise
 from murmillo.agents.common.ranks import ALONE, Ranks
 from murmillo.agents.common.rollout import Rollout
 from murmillo.agents.common.training import Means, adam, load_parts, minimise, named, state_of
@@ -72,7 +71,7 @@ class AdaptNet(Blending):
         self._observe_demonstrations()
         self.masks = FeatureMasks(demonstrations)
         self.optimizer = adam((self.discriminator.parameters(), config.discriminator.learning_rate))
-        self.noise = ActionNoise(generator, config.ppo.noise_correlation, ranks)
+        self.noise = action_noise(config.ppo, generator, ranks)
         self._parts = {
             "ppo": self.ppo,
             "noise": self.noise,
@@ -82,7 +81,8 @@ class AdaptNet(Blending):
 
     def act(self, obs: Obs, *, deterministic: bool = False) -> Step:
         told = self.observed.beside(obs)
-        return Step(*self.model.act(self.observed.state(obs), told, None if deterministic else self.noise))
+        state, noise = self.observed.state(obs), None if deterministic else self.noise
+        return Step(*self.model.act(state, told, noise), quiet=self.noise.quiet)
 
     def value(self, obs: Obs, extras: dict[str, Tensor]) -> Tensor:
         """Expected returns `[..., 2]` of goal and imitation."""

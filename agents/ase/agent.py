@@ -13,11 +13,10 @@ from murmillo.agents.common.blending import Blending
 from murmillo.agents.common.dimensions import dimensions
 from murmillo.agents.common.discriminator import Discriminator, Windows
 from murmillo.agents.common.discriminator_loss import discriminator_loss
-from murmillo.agents.common.exploration import ActionNoise
 from murmillo.agents.common.interface import Demonstrations, Obs, Step
 from murmillo.agents.common.latents import LatentSequence, sample_sphere
 from murmillo.agents.common.masks import FeatureMasks
-from murmillo.agents.common.ppo import PPO, Minibatch
+from murmillo.agents.common.ppo import PPO, Minibatch, action_noise
 from murmillo.agents.common.ranks import ALONE, Ranks
 from murmillo.agents.common.replay import Replay
 from murmillo.agents.common.rollout import Rollout
@@ -69,7 +68,7 @@ class ASE(Blending):
         self.model = SkillModel(env, state_dim, action_dim, config.latent_dim, config, generator, base)
         self.needs = self.model.needs
         self.ppo = PPO(self.model, config.ppo)
-        self.noise = ActionNoise(generator, config.ppo.noise_correlation, ranks)
+        self.noise = action_noise(config.ppo, generator, ranks)
         hidden = config.discriminator.hidden
         self.discriminator = Discriminator(config.window, state_dim, config.discriminator, generator, ranks=ranks)
         # known before the first update, lest that judges windows in raw units and every later one in other units
@@ -101,7 +100,7 @@ class ASE(Blending):
         latent = self.latents.step()
         told = self.model.told(latent, obs)
         action, log_prob = self.model.act(obs["state"], told, None if deterministic else self.noise)
-        return Step(action, log_prob, {"latent": latent})
+        return Step(action, log_prob, {"latent": latent}, self.noise.quiet)
 
     def value(self, obs: Obs, extras: dict[str, Tensor]) -> Tensor:
         return self.model.value(obs["state"], self.model.told(extras["latent"], obs))

@@ -16,10 +16,9 @@ from murmillo.agents.common.blending import Blending
 from murmillo.agents.common.dimensions import dimensions
 from murmillo.agents.common.discriminator import Discriminator, Windows
 from murmillo.agents.common.discriminator_loss import discriminator_loss
-from murmillo.agents.common.exploration import ActionNoise
 from murmillo.agents.common.interface import Demonstrations, Obs, Step
 from murmillo.agents.common.latents import sample_sphere
-from murmillo.agents.common.ppo import PPO, Minibatch
+from murmillo.agents.common.ppo import PPO, Minibatch, action_noise
 from murmillo.agents.common.ranks import ALONE, Part, Ranks
 from murmillo.agents.common.replay import Replay
 from murmillo.agents.common.rollout import Rollout
@@ -72,7 +71,7 @@ class CALM(Blending):
         if base is not None:
             take_over(self.encoder, base, "encoder")
         self.ppo = PPO(self.model, config.ppo, self.encoder.parameters())
-        self.noise = ActionNoise(generator, config.ppo.noise_correlation, ranks)
+        self.noise = action_noise(config.ppo, generator, ranks)
         condition = LatentCondition(config.latent_dim, config.discriminator_style_hidden, generator)
         self.discriminator = Discriminator(
             config.window, state_dim, config.discriminator, generator, condition, ranks=ranks
@@ -122,7 +121,7 @@ class CALM(Blending):
         action, log_prob = self.model.act(obs["state"], told, None if deterministic else self.noise)
         mask = self.motions.mask(motion)
         extras = {"latent": latent, "motion": motion}
-        return Step(action, log_prob, extras if mask is None else extras | {"mask": mask})
+        return Step(action, log_prob, extras if mask is None else extras | {"mask": mask}, self.noise.quiet)
 
     def value(self, obs: Obs, extras: dict[str, Tensor]) -> Tensor:
         return self.model.value(obs["state"], self.model.told(extras["latent"], obs))

@@ -15,12 +15,11 @@ from murmillo.agents.common.blending import Blending
 from murmillo.agents.common.dimensions import dimensions, skill_count
 from murmillo.agents.common.discriminator import Discriminator, Windows
 from murmillo.agents.common.discriminator_loss import discriminator_loss
-from murmillo.agents.common.exploration import ActionNoise
 from murmillo.agents.common.interface import Demonstrations, Obs, Step
 from murmillo.agents.common.latents import LatentSequence, sample_sphere
 from murmillo.agents.common.masks import FeatureMasks
 from murmillo.agents.common.networks import REACH, Told, by_name
-from murmillo.agents.common.ppo import PPO, Minibatch
+from murmillo.agents.common.ppo import PPO, Minibatch, action_noise
 from murmillo.agents.common.ranks import ALONE, Part, Ranks
 from murmillo.agents.common.replay import Replay
 from murmillo.agents.common.rollout import Rollout
@@ -79,7 +78,7 @@ class CASE(Blending):
         self.model = SkillModel(env, state_dim, action_dim, told_dim, config, generator, base)
         self.needs = self.model.needs
         self.ppo = PPO(self.model, config.ppo, self.label.parameters())
-        self.noise = ActionNoise(generator, config.ppo.noise_correlation, ranks)
+        self.noise = action_noise(config.ppo, generator, ranks)
         heads = SkillHeads(labels)
         self.discriminator = Discriminator(
             config.window, state_dim, config.discriminator, generator, heads, ranks=ranks
@@ -122,7 +121,7 @@ class CASE(Blending):
         latent, label = self.latents.step(), obs["skill"]
         told = self._helped(self.model.told(self.condition(latent, label), obs), label)
         action, log_prob = self.model.act(obs["state"], told, None if deterministic else self.noise)
-        return Step(action, log_prob, {"latent": latent, "label": label})
+        return Step(action, log_prob, {"latent": latent, "label": label}, self.noise.quiet)
 
     def condition(self, latent: Tensor, label: Tensor) -> Tensor:
         """What policy and critic are told beside the state: `[..., Z + label_dim]` from `[..., Z]` and `[...]`."""

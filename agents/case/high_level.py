@@ -99,10 +99,12 @@ class HybridPolicy(GaussianPolicy):
 
     def sample(self, parameters: Tensor, noise: ActionNoise) -> Tensor:
         logits, mean = self._split(parameters)
-        worlds = noise.worlds(len(logits))
+        latent, worlds = super().sample(mean, noise), noise.worlds(len(logits))
         exponential = torch.empty(worlds.total, self.labels).exponential_(generator=noise.generator)
         gumbel = -worlds.of(exponential).log()
-        return torch.cat([self._scores(logits + gumbel), super().sample(mean, noise)], -1)
+        if noise.quiet is not None:
+            gumbel = gumbel.masked_fill(noise.quiet.unsqueeze(-1), 0.0)
+        return torch.cat([self._scores(logits + gumbel), latent], -1)
 
     def mode(self, parameters: Tensor) -> Tensor:
         logits, mean = self._split(parameters)

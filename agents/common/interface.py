@@ -20,11 +20,14 @@ class Step:
         action: `[N, A]`, as drawn; the environment clamps it to [-1, 1], the log probability is of the unclamped one.
         log_prob: `[N]`.
         extras: what the agent must see again when it learns from this step, `[N, ...]` each: a latent, a label.
+        quiet: `[N]` bool, the worlds whose action has no noise: their policy learns nothing from this step, their
+            critic does; None where all have.
     """
 
     action: Tensor
     log_prob: Tensor
     extras: dict[str, Tensor] = field(default_factory=dict)
+    quiet: Tensor | None = None
 
 
 class Agent(Protocol):

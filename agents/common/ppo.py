@@ -15,7 +15,7 @@ from murmillo.agents.common.losses import approx_kl, clip_fraction, ppo_policy_l
 from murmillo.agents.common.networks import Critic, GaussianPolicy, Policy, Told
 from murmillo.agents.common.normalizer import RunningNormalizer
 from murmillo.agents.common.numbers import check_above_zero, check_at_least
-from murmillo.agents.common.ranks import Part
+from murmillo.agents.common.ranks import Part, Ranks
 from murmillo.agents.common.rollout import Rollout
 from murmillo.agents.common.training import Means, adam, adam_state, load_adam_state, load_module, minimise
 
@@ -47,6 +47,8 @@ class PPOConfig:
             move at the rates of weights. AdaptNet's depends on the state and always learns, as weights.
         std_least: what it does not shrink below, so that something is left to learn from once the character stands.
         noise_correlation: between the noise of one action and the next; the papers' noise is white.
+        quiet_share: of the steps, in stretches, in which a world acts without noise, as it is played; the policy learns
+            from what comes after (`ActionNoise`).
         mean_init_scale: factor on the initial weights of the policy's last layer.
         policy_learning_rate: Adam's step for the policy.
         policy_momentum: of its gradients from minibatch to minibatch, Adam's first beta; 0.9 are the gradients of half
@@ -74,6 +76,7 @@ class PPOConfig:
     std_learning_rate: float = 0.0
     std_least: float = 0.0
     noise_correlation: float = 0.0
+    quiet_share: float = 0.0
     mean_init_scale: float = 1.0
     policy_learning_rate: float = 2e-5
     policy_momentum: float = 0.9
@@ -97,10 +100,9 @@ class PPOConfig:
         check_above_zero(self, "agent.ppo", "std", "clip", "max_grad_norm", "target_kl", "lead_kl")
         if self.std_least > self.std:
             raise AgentError(f"agent.ppo.std_least={self.std_least}: needs at most std, {self.std}")
-        if not 0 <= self.noise_correlation < 1:
-            raise AgentError(f"agent.ppo.noise_correlation={self.noise_correlation}: needs at least 0 and less than 1")
-        if not 0 <= self.policy_momentum < 1:
-            raise AgentError(f"agent.ppo.policy_momentum={self.policy_momentum}: needs at least 0 and less than 1")
+        for name in ("noise_correlation", "quiet_share", "policy_momentum"):
+            if not 0 <= getattr(self, name) < 1:
+                raise AgentError(f"agent.ppo.{name}={getattr(self, name)}: needs at least 0 and less than 1")
 
 
 class ActorCritic(nn.Module):
@@ -150,6 +152,11 @@ class ActorCritic(nn.Module):
         """Let the normalisers learn from a rollout, once the update that used them is over."""
         self.state_normalizer.update(rollout["state"], ranks=rollout.ranks)
         self.return_normalizer.update(rollout["return"], ranks=rollout.ranks)
+
+
+def action_noise(config: PPOConfig, generator: torch.Generator, ranks: Ranks) -> ActionNoise:
+    """The noise that the config describes."""
+    return ActionNoise(generator, config.noise_correlation, ranks, quiet_share=config.quiet_share)
 
 
 def gaussian_policy(

@@ -181,6 +181,8 @@ class Runner:
             step = self.agent.act(obs)
             seen = {name: value for name, value in obs.items() if name in self.agent.needs}
             rollout.store(t, {**seen, **step.extras, "action": step.action, "log_prob": step.log_prob})
+            if step.quiet is not None:
+                rollout.store(t, {"quiet": step.quiet})
             next_obs, reward, terminated, truncated, infos = self.env.step(taken(self.env, step.action))
 
             successor = {f"next_{name}": value for name, value in true_next_obs(next_obs, infos).items()}
@@ -254,6 +256,8 @@ class Runner:
             rollout["advantage"] = weigh_advantages(advantage, weights, ranks=self.ranks)
         else:
             rollout["advantage"] = normalise_advantage(advantage, ranks=self.ranks)
+        if "quiet" in rollout:
+            rollout["advantage"] = rollout["advantage"].masked_fill(rollout["quiet"], 0.0)
 
     def _leave_out(self, rollout: Rollout, healed: Tensor, value: Tensor) -> None:
         """Learn nothing from steps in which a simulation diverged; the steps before them end in the expected return."""

@@ -12,10 +12,9 @@ from torch.nn import functional as F
 
 from murmillo.agents.common.dimensions import action_size, skill_count
 from murmillo.agents.common.errors import AgentError
-from murmillo.agents.common.exploration import ActionNoise
 from murmillo.agents.common.interface import Obs, Step
 from murmillo.agents.common.networks import GaussianPolicy
-from murmillo.agents.common.ppo import PPO, ActorCritic, Minibatch, PPOConfig
+from murmillo.agents.common.ppo import PPO, ActorCritic, Minibatch, PPOConfig, action_noise
 from murmillo.agents.common.ranks import ALONE, Ranks
 from murmillo.agents.common.rollout import Rollout
 from murmillo.agents.common.training import load_parts, named, state_of
@@ -82,12 +81,12 @@ class TaskAgent:
         policy = make_policy(width, action_dim, self._skills) if make_policy else None
         self.model = ActorCritic(width, action_dim, self._skills, config.ppo, generator, policy)
         self.ppo = PPO(self.model, config.ppo)
-        self.noise = ActionNoise(generator, config.ppo.noise_correlation, ranks)
+        self.noise = action_noise(config.ppo, generator, ranks)
         self._parts = {"ppo": self.ppo, "noise": self.noise}
 
     def act(self, obs: Obs, *, deterministic: bool = False) -> Step:
-        told = self._condition(obs)
-        return Step(*self.model.act(self._input(obs), told, None if deterministic else self.noise))
+        noise = None if deterministic else self.noise
+        return Step(*self.model.act(self._input(obs), self._condition(obs), noise), quiet=self.noise.quiet)
 
     def value(self, obs: Obs, extras: dict[str, Tensor]) -> Tensor:
         return self.model.value(self._input(obs), self._condition(obs))

@@ -66,6 +66,14 @@ def test_the_relaxed_labels_density_is_that_of_the_concrete_distribution(generat
     )
 
 
+@pytest.mark.parametrize("gumbel", [None, 0.3])
+def test_a_quiet_world_takes_the_likeliest_label(gumbel: float | None, generator: torch.Generator) -> None:
+    noise = ActionNoise(generator, quiet_share=0.5)
+    action, likeliest = policy(gumbel).sample(parameters(100), noise), policy(gumbel).mode(parameters(100))
+    assert noise.quiet is not None
+    assert torch.equal((action == likeliest).all(-1), noise.quiet)
+
+
 @pytest.mark.parametrize("gumbel", [None, 0.3, 2.0])
 def test_labels_come_as_often_as_their_probabilities_say(gumbel: float | None, generator: torch.Generator) -> None:
     action = policy(gumbel).sample(parameters(40_000), ActionNoise(generator))

@@ -3,7 +3,7 @@
 import pytest
 import torch
 
-from murmillo.agents.common.exploration import ActionNoise
+from murmillo.agents.common.exploration import QUIET_STEPS, ActionNoise
 
 STEPS, WORLDS, DIM = 400, 200, 3
 
@@ -57,3 +57,41 @@ def test_noise_that_was_learned_with_begins_anew_in_other_worlds() -> None:
     playing, fresh = (ActionNoise(torch.Generator().manual_seed(1), 0.9) for _ in range(2))
     playing.load_state_dict(learned.state_dict())
     assert torch.equal(playing.step(2, DIM), fresh.step(2, DIM))
+
+
+@pytest.mark.parametrize("share", [0.25, 0.6])
+def test_worlds_are_quiet_for_the_share_of_the_steps_in_stretches(share: float) -> None:
+    noise = ActionNoise(torch.Generator().manual_seed(0), 0.9, quiet_share=share)
+    drawn, quiet = [], []
+    for _ in range(2000):
+        drawn.append(noise.step(WORLDS, DIM))
+        assert noise.quiet is not None
+        quiet.append(noise.quiet)
+    silent = torch.stack(quiet)
+    assert torch.equal((torch.stack(drawn) == 0.0).all(-1), silent)
+    torch.testing.assert_close(silent[0].double().mean().item(), share, atol=0.1, rtol=0)
+    torch.testing.assert_close(silent.double().mean().item(), share, atol=0.02, rtol=0)
+    ends = (silent[:-1] & ~silent[1:]).double().sum() / silent[:-1].double().sum()
+    torch.testing.assert_close(1 / ends.item(), float(QUIET_STEPS), atol=3.0, rtol=0)
+
+
+def test_the_noise_of_the_others_is_what_it_was() -> None:
+    noise = ActionNoise(torch.Generator().manual_seed(0), quiet_share=0.5)
+    first = noise.step(WORLDS, DIM)
+    assert noise.quiet is not None
+    assert torch.equal(first[~noise.quiet], drawn(0.0, 1)[0][~noise.quiet])
+
+
+def test_quiet_worlds_are_quiet_still_when_it_goes_on() -> None:
+    generator = torch.Generator().manual_seed(0)
+    first = ActionNoise(generator, 0.9, quiet_share=0.5)
+    first.step(WORLDS, DIM)
+    kept, state = first.state_dict(), generator.get_state()
+    expected = first.step(WORLDS, DIM)
+    again = ActionNoise(generator, 0.9, quiet_share=0.5)
+    again.load_state_dict(kept)
+    generator.set_state(state)
+    assert torch.equal(again.step(WORLDS, DIM), expected)
+    other = ActionNoise(generator, 0.9, quiet_share=0.5)
+    other.load_state_dict(kept)
+    assert other.step(2, DIM).shape == (2, DIM)  # loaded to play in other worlds

@@ -30,6 +30,7 @@ from murmillo.agents.common.warm_start import WarmStartConfig
         (PPOConfig, "minibatch", 0, "agent.ppo.minibatch=0: needs at least 1"),
         (PPOConfig, "std", 0.0, "agent.ppo.std=0.0: needs a number above 0"),
         (PPOConfig, "noise_correlation", 1.0, "agent.ppo.noise_correlation=1.0: needs at least 0 and less than 1"),
+        (PPOConfig, "quiet_share", 1.0, "agent.ppo.quiet_share=1.0: needs at least 0 and less than 1"),
         (PPOConfig, "noise_correlation", math.nan, "agent.ppo.noise_correlation=nan: needs at least 0 and less than 1"),
         (PPOConfig, "clip", -1.0, "agent.ppo.clip=-1.0: needs a number above 0"),
         (PPOConfig, "clip", math.nan, "agent.ppo.clip=nan: needs a number above 0"),

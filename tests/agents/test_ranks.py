@@ -16,7 +16,7 @@ from tests.agents.toy_ranks import run_as, train_alone
 
 HINGE = replace(small_ase().discriminator, loss="hinge")
 RUNS: dict[str, tuple[str, dict[str, Any]]] = {
-    "ase": ("ase", {"ppo": replace(small_ase().ppo, noise_correlation=0.5)}),
+    "ase": ("ase", {"ppo": replace(small_ase().ppo, noise_correlation=0.5, quiet_share=0.4)}),
     "case": ("case", {"discriminator": small_ase().discriminator}),  # without dropout
     "calm": ("calm", {}),
     "ase_hinge": ("ase", {"discriminator": HINGE}),

@@ -1,3 +1,4 @@
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ from murmillo.agents.common.episodes import EpisodeStatistics
 from murmillo.agents.common.errors import AgentError
 from murmillo.agents.common.logger import Logger
 from murmillo.agents.common.rollout import taken
-from tests.agents.toy import PointMass, equal, make_runner
+from tests.agents.toy import PointMass, equal, make_runner, small_ase
 
 ITERATION = 32 * 8
 
@@ -221,6 +222,28 @@ def test_nothing_is_learned_from_steps_of_diverged_worlds(tmp_path: Path) -> Non
     rows = torch.cat([rows for rows, _ in whole.minibatches(7, torch.Generator().manual_seed(0))])
     assert rows.sort().values.tolist() == list(range(whole.samples - 2))
     runner.agent.update(whole)
+
+
+def test_a_policy_learns_nothing_from_steps_without_noise_and_its_critic_does(tmp_path: Path) -> None:
+    ppo = replace(small_ase().ppo, quiet_share=0.5)
+    runner = make_runner(tmp_path, agent={"ppo": ppo})
+    rollout = runner._collect()
+    runner._reward(rollout)
+    runner._advantage(rollout)
+    quiet = rollout["quiet"]
+    assert quiet.any()
+    assert not quiet.all()
+    assert (rollout["advantage"][quiet] == 0).all()
+    assert (rollout["advantage"][~quiet] != 0).all()
+    assert (rollout["return"][quiet] != 0).all()
+    # what is quiet is the mean itself, which no noise comes to
+    likeliest = rollout["log_prob"][quiet]
+    torch.testing.assert_close(likeliest, likeliest.max().expand_as(likeliest))
+    assert (rollout["log_prob"][~quiet] < likeliest.max()).all()
+
+
+def test_without_quiet_steps_all_are_learned_from(tmp_path: Path) -> None:
+    assert "quiet" not in make_runner(tmp_path)._collect()
 
 
 def test_tensors_stay_tensors_where_the_environment_takes_them() -> None:
