@@ -11,7 +11,7 @@ from murmillo.envs.motion import MotionLibrary
 from murmillo.envs.observations import StateParts, state_parts
 from murmillo.envs.skills import CommandedSkills
 
-PROGRESS_SIZE = 9
+PROGRESS_SIZE = 10
 """Numbers of `Tracker.progress`."""
 
 _ON_TIME = 1e-9
@@ -32,8 +32,12 @@ _NEARER, _ALIKE = 0.7, 0.5
 than this: who stands still is a little nearer to the step before, and far nearer to what lies ten steps back."""
 _WAITED = 0.3
 """What is left of the reward while the clip waits: who stays where it is has not followed."""
+_FORGOTTEN = 1.0
+"""[s] after which little is left of a deviation of the heading."""
+_HEADING = 15.0
+"""Weight of that deviation's square, which is the root's rotation's."""
 
-_OWN_STATE = ("clip", "time", "held", "error")
+_OWN_STATE = ("clip", "time", "held", "error", "turned")
 
 
 @dataclass
@@ -46,6 +50,7 @@ class TrackingConfig:
         near: within this of a clip's first pose, by the same measure, the clip begins [m].
         patience: time in which to come there from the middle of another skill [s]; then the clip begins all the same.
             A clip that has begun waits no longer either: whoever makes it has lost it.
+        turned: it has lost it too where, within about a second, it has turned by this more or less than the clip [rad].
         switch: probability that another skill is commanded where a clip ends; else it begins again.
     """
 
@@ -53,11 +58,12 @@ class TrackingConfig:
     lost: float = 0.5
     near: float = 0.15
     patience: float = 1.0
+    turned: float = 0.6
     switch: float = 0.5
 
     def check(self) -> None:
         """Raise SuiteError for what cannot be."""
-        for name in ("lost", "near", "patience"):
+        for name in ("lost", "near", "patience", "turned"):
             if not getattr(self, name) >= 0.0:
                 raise SuiteError(f"tracking.{name}={getattr(self, name)}: needs at least 0")
         if not 0.0 <= self.switch <= 1.0:
@@ -74,7 +80,9 @@ class Tracker:
     the same reason a clip waits for whoever is behind, which is then paid less, and hurries after whoever is ahead.
     Who stands still while the clip moves is behind, however near to it.
 
-    What is compared is `character_state`, so that neither place nor heading count, but the speeds do.
+    What is compared is `character_state`, so that neither place nor heading count, but the speeds do. A speed that is a
+    little wrong is a small error, and the feet of a slow turn hardly leave the ground: so the error of the root's spin
+    is summed, with a memory of a second. Who stands where the clip turns is soon turned away from it.
     """
 
     def __init__(
@@ -90,6 +98,7 @@ class Tracker:
         self._clip = torch.zeros(num_envs, dtype=torch.int64)
         self._time = torch.zeros(num_envs, dtype=torch.float64)
         self._held = torch.zeros(num_envs, dtype=torch.float64)
+        self._turned = torch.zeros(num_envs)
         self._character = character
         self._error = torch.zeros(num_envs, 5)
         spans = [self._span(clip) for clip in range(len(library.clips))]
@@ -98,7 +107,7 @@ class Tracker:
     def begin(self, env_ids: Tensor, clip: Tensor, time: Tensor) -> None:
         """These worlds are at `time` [n] [s] of `clip` [n], or at the next moment of it that is no rest."""
         latest = self._last[clip] - CONTROL_DT
-        self._held[env_ids] = 0.0
+        self._held[env_ids], self._turned[env_ids] = 0.0, 0.0
         self._clip[env_ids], self._time[env_ids] = clip, torch.minimum(torch.maximum(time, self._first[clip]), latest)
         self._error[env_ids] = torch.tensor([1.0, 1.0, 1.0, 1.0, 0.0])
 
@@ -106,7 +115,7 @@ class Tracker:
         """These worlds [n] are to come to the beginning of a clip of their skill, wherever they are."""
         self._clip[env_ids], _ = self._library.sample(len(env_ids), generator, self._skills.current[env_ids])
         self._time[env_ids], self._held[env_ids] = -self._config.patience, 0.0
-        self._error[env_ids] = 0.0
+        self._error[env_ids], self._turned[env_ids] = 0.0, 0.0
 
     def step(self, state: Tensor, generator: torch.Generator) -> tuple[Tensor, Tensor]:
         """One control step further; what the worlds do and are commanded next.
@@ -124,7 +133,10 @@ class Tracker:
             self.turn(others, generator)
         first = self._first[self._clip]
         before, begun = self._time, self._time >= first - _ON_TIME
-        self._time, squares, distance = self._nearest(state)
+        self._time, squares, distance, spin = self._nearest(state)
+        turned = (1.0 - CONTROL_DT / _FORGOTTEN) * self._turned + CONTROL_DT * spin
+        self._turned = torch.where(begun, turned, 0.0)
+        squares[1] += _HEADING * self._turned.square()
         likeness = _likeness(squares)
         self._error = torch.cat((likeness, distance.unsqueeze(0))).T
         reward = (torch.tensor([[0.4], [0.2], [0.2], [0.2]]) * likeness).sum(0)
@@ -132,6 +144,7 @@ class Tracker:
         held = torch.where(self._time > before, -CONTROL_DT, CONTROL_DT)
         self._held = torch.where(begun, (self._held + held).clamp_min(0.0), 0.0)
         lost = (distance > self._config.lost) & (self._time > first + _SETTLED) | (self._held > self._config.patience)
+        lost |= self._turned.abs() > self._config.turned
         there = (self._time < first) & ((distance < self._config.near) | (self._time >= 0.0))
         self._time = torch.where(there, first, self._time)
         self._end(generator)
@@ -139,17 +152,17 @@ class Tracker:
 
     @property
     def progress(self) -> Tensor:
-        """[N, 9] what following pays for and a state does not show, for critics.
+        """[N, 10] what following pays for and a state does not show, for critics.
 
         They are the four exponentials of the last step's errors, in [0, 1], and the distance of the key points [m]; the
         sine and cosine of where in the clip the character should be; for how long the clip has waited [s], and how long
-        it will before it begins in any case [s].
+        it will before it begins in any case [s]; by how much the heading has turned away from the clip's [rad].
         """
         first, last = self._first[self._clip], self._last[self._clip]
         angle = 2 * torch.pi * (self._time - first) / (last - first).clamp_min(CONTROL_DT)
         begins = torch.where(self._time < first, (-self._time).clamp_min(CONTROL_DT), 0.0)
         clock = torch.stack((angle.sin(), angle.cos(), self._held, begins), -1)
-        return torch.cat((self._error, clock.float()), -1)
+        return torch.cat((self._error, clock.float(), self._turned.unsqueeze(-1)), -1)
 
     @property
     def waited(self) -> Tensor:
@@ -165,13 +178,14 @@ class Tracker:
         first, last, again = (ends[self._clip] for ends in (self._first, self._last, self._again))
         return torch.maximum(torch.where(time > last + _ON_TIME, again + time - last, time), first)
 
-    def _nearest(self, state: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+    def _nearest(self, state: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
         """A control step on, at the pace that brings the clip to where it is nearest to the character.
 
         A policy sees no clock: were the clip's to run on, one that is late would never be right again.
 
         Returns:
-            time [N] [s]; weighted squares [4, N] of the errors; mean distance of the key points [N] [m].
+            time [N] [s]; weighted squares [4, N] of the errors; mean distance of the key points [N] [m]; how much
+            faster than the clip the root turns [N] [rad/s].
         """
         look, worlds = torch.tensor(_LOOK), torch.arange(len(state))
         times = self._time + CONTROL_DT * look.double().unsqueeze(-1)
@@ -186,7 +200,8 @@ class Tracker:
         pace = torch.where(self._time < self._first[self._clip], 1, look[apart.argmin(0)].clamp(0, 2))
         chosen = _GOES_ON - 1 + pace
         distance = error[chosen, worlds][:, self._parts.keys].unflatten(-1, (-1, 3)).norm(dim=-1).mean(-1)
-        return times[chosen, worlds], squares[:, chosen, worlds], distance
+        spin = error[chosen, worlds][:, self._parts.angular][:, 2]
+        return times[chosen, worlds], squares[:, chosen, worlds], distance, spin
 
     def _end(self, generator: torch.Generator) -> None:
         """Where clips are over they begin again, or other skills are commanded."""

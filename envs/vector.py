@@ -46,7 +46,7 @@ class HumanoidVectorEnv(VectorEnv):
         state: [N, 120] float32, the table in `murmillo.envs.observations.character_state`; with `features="links"`
             [N, 4, 13 B] (`murmillo.envs.features.LinkFeatures`), of which `length` [N] int64 frames count.
         heights: [N, 35, 35] float32, the ground about the root (only on uneven ground; `Terrain.map`).
-        progress: [N, 9] float32, how far along which clip it is and how well it follows, for critics (only where
+        progress: [N, 10] float32, how far along which clip it is and how well it follows, for critics (only where
             `tracking.follow`; `Tracker.progress`).
         skill: [N] int64, the commanded label, an index into `skills`; random and independent of the start, but for the
             share `starts.commanded` of the starts in a clip.

@@ -136,8 +136,8 @@ class CASE(Blending):
     def directions(self) -> dict[str, Any]:
         """Focal sampling draws the labels of new episodes; the curriculum (appendix A.5) begins without the ground."""
         directions: dict[str, Any] = {}
-        if self.config.focal != "none":
-            directions["skill_weights"] = self.focal.probability
+        if self.config.focal != "none" or self.config.focal_steps:
+            directions["skill_weights"] = self.focal.commanded
         if self.config.upright_iterations:
             directions["ground_contact"] = self.iterations >= self.config.upright_iterations
         return directions

@@ -38,6 +38,8 @@ class CASEConfig(SkillConfig):
         focal_rate: alpha of eq. 4.
         focal_start: iterations before the sampling leaves the uniform.
         focal_floor: least probability of a skill, as a share of the uniform (released code).
+        focal_steps: whether a skill's share is one of the steps and not of the episodes: what falls early would else be
+            practised least.
         assistance: how residual forces fade.
         upright_iterations: first iterations in which only the feet may touch the ground; 0 for no such curriculum.
         discriminator: its dropout is the element-wise feature masking.
@@ -57,6 +59,7 @@ class CASEConfig(SkillConfig):
     focal_rate: float = 0.2
     focal_start: int = 2500
     focal_floor: float = 0.01
+    focal_steps: bool = False
     upright_iterations: int = 15_000
     assistance: AssistanceConfig = field(default_factory=AssistanceConfig)
     ppo: PPOConfig = field(default_factory=lambda: PPOConfig(style_hidden=()))

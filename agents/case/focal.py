@@ -8,6 +8,8 @@ from torch import Tensor
 from murmillo.agents.case.config import CASEConfig
 from murmillo.agents.common.ranks import ALONE, Ranks
 
+_PACE, _REACH = 0.02, 20.0
+"""Exponent of a correction of `FocalSampling.commanded` in an iteration, and its bound either way."""
 _TINY = 1e-6
 """Keeps a score that rounds to 0 or 1 inside, and the weight of an only skill, which fades by eq. 4, above 0."""
 
@@ -44,6 +46,13 @@ class FocalSampling:
         self.score = torch.full((skills,), 0.5)
         self.weight = torch.full((skills,), 1 / skills)
         self.probability = self.weight.clone()
+        self._correction = torch.ones(skills)
+
+    @property
+    def commanded(self) -> Tensor:
+        """Weights `[K]` to command new episodes with; where shares are of steps, short ones are begun more often."""
+        weight = self.probability * self._correction
+        return weight / weight.sum()
 
     def draw(self, n: int, generator: torch.Generator) -> Tensor:
         """Labels `[n]` int64."""
@@ -62,6 +71,9 @@ class FocalSampling:
         count = ranks.sum(torch.bincount(labels, minlength=skills))
         mean = ranks.sum(torch.zeros(skills).index_add(0, labels, scores)) / count
         self.score = torch.where(count > 0, mean, self.score).clamp(_TINY, 1 - _TINY)
+        if config.focal_steps:
+            missing = self.probability / (count / count.sum()).clamp(min=_TINY)
+            self._correction = (self._correction * missing.clamp(0.5, 2.0) ** _PACE).clamp(1 / _REACH, _REACH)
         if config.focal == "none" or not active:
             return
         rate = self.CODE_RATE if config.focal == "code" else config.focal_rate
@@ -83,7 +95,9 @@ class FocalSampling:
             "score": self.score,
             "weight": self.weight,
             "probability": self.probability,
+            "correction": self._correction,
         }
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         self.score, self.weight, self.probability = state["score"], state["weight"], state["probability"]
+        self._correction = state["correction"]

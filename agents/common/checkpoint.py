@@ -15,7 +15,7 @@ from torch import Tensor
 from murmillo.agents.common.errors import AgentError
 
 FORMAT = "murmillo-checkpoint"
-VERSION = 4
+VERSION = 5
 """Grows whenever what is saved takes another form."""
 TENSORS = "tensors.safetensors"
 META = "meta.json"

@@ -15,7 +15,7 @@ from murmillo.agents.common.heights import HEIGHTS, HeightMapEncoder, check_map
 from murmillo.agents.common.networks import CONDITION, Critic, Told, by_name
 from murmillo.agents.common.ppo import ActorCritic, Minibatch, PPOConfig, gaussian_policy
 
-PROGRESS, PROGRESS_SIZE = "progress", 9
+PROGRESS, PROGRESS_SIZE = "progress", 10
 """The observation of how a clip is followed, for critics."""
 
 

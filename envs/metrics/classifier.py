@@ -27,7 +27,8 @@ class ClassifierConfig:
         jitter: what is added to a window that trains, of each feature's deviation and the same in all frames: a
             character is never quite where its clip is, and one that stands has nothing else to be known by.
         held: a window that differs by more from the pose in its middle, in mean squared deviations of its features, is
-            a motion; that pose, held still, is none, unless it is as near to the pose of a clip that stands.
+            a motion; that pose, held still, is none.
+        stand: where such a pose is as near as this to one of a clip that stands, by the same measure, it is that stand.
         steps: of Adam, each on a batch in which every class is as likely.
         rate: of Adam, annealed to 0 along a cosine.
     """
@@ -36,6 +37,7 @@ class ClassifierConfig:
     held_out: float = 0.1
     jitter: float = 0.3
     held: float = 0.15
+    stand: float = 0.3
     hidden: int = 256
     dropout: float = 0.3
     steps: int = 800
@@ -182,9 +184,8 @@ def _train(
     """A perceptron that has learned the class of each window, and `classes` of poses held still if rates are known."""
     scale, outputs = _Scale(window), classes + bool(rates.any())
     if outputs > classes:
-        still = _held_poses(window, target, rates, scale, config.held)
-        window = torch.cat((window, still))
-        target = torch.cat((target, target.new_full((len(still),), classes)))
+        still, seen_as = _held_poses(window, target, rates, scale, config)
+        window, target = torch.cat((window, still)), torch.cat((target, seen_as))
     balanced = 1.0 / target.bincount()[target]
     with torch.random.fork_rng(devices=[]):  # layers and dropout draw from torch's own generator
         torch.manual_seed(seed)
@@ -203,20 +204,26 @@ def _train(
     return network.eval()
 
 
-def _held_poses(window: Tensor, target: Tensor, rates: Tensor, scale: "_Scale", held: float) -> Tensor:
-    """Windows [m, F, D] of poses at rest, each the middle of a window of its motion, that no stand is like.
+def _held_poses(
+    window: Tensor, target: Tensor, rates: Tensor, scale: "_Scale", config: ClassifierConfig
+) -> tuple[Tensor, Tensor]:
+    """Windows [m, F, D] of poses at rest, each the middle of a window of a motion, and the class that each is seen as.
 
-    A class whose windows hardly move, most of them, is a stand.
+    A class whose windows hardly move, most of them, is a stand. Held still, a pose is the stand that it is near, or
+    none: the last class.
     """
-    pose = window[:, window.shape[1] // 2].masked_fill(rates, 0.0)
-    moves = ((window - pose.unsqueeze(1)) / scale.deviation).square().mean((1, 2)) > held
-    stands = moves.double().new_zeros(int(target.max()) + 1).index_add_(0, target, (~moves).double())
-    stand = pose[~moves & (stands > 0.5 * target.bincount())[target]]
-    if len(stand):
-        parts, stand = (pose / scale.deviation).split(_AT_ONCE), stand / scale.deviation
-        apart = torch.cat([torch.cdist(part, stand).amin(1) for part in parts])
-        moves &= apart.square() / pose.shape[1] > held
-    return pose[moves].unsqueeze(1).expand(-1, window.shape[1], -1)
+    pose, classes = window[:, window.shape[1] // 2].masked_fill(rates, 0.0), int(target.max()) + 1
+    moves = ((window - pose.unsqueeze(1)) / scale.deviation).square().mean((1, 2)) > config.held
+    stands = moves.double().new_zeros(classes).index_add_(0, target, (~moves).double()) > 0.5 * target.bincount()
+    own = ~moves & stands[target]
+    seen_as = target.new_full((int(moves.sum()),), classes)
+    if own.any():
+        parts, stand = (pose[moves] / scale.deviation).split(_AT_ONCE), pose[own] / scale.deviation
+        found = [torch.cdist(part, stand).min(1) for part in parts]
+        apart, nearest = (torch.cat(column) for column in zip(*found, strict=True))
+        near = apart.square() / pose.shape[1] <= config.stand
+        seen_as = torch.where(near, target[own][nearest], seen_as)
+    return pose[moves].unsqueeze(1).expand(-1, window.shape[1], -1), seen_as
 
 
 def _network(scale: "_Scale", inputs: int, classes: int, config: ClassifierConfig) -> nn.Module:

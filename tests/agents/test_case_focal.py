@@ -91,3 +91,34 @@ def test_labels_are_drawn_by_the_shares(generator: torch.Generator) -> None:
     sampling.probability = T([0.7, 0.2, 0.1])
     drawn = torch.bincount(sampling.draw(20_000, generator), minlength=3) / 20_000
     assert drawn.tolist() == pytest.approx([0.7, 0.2, 0.1], abs=0.015)
+
+
+def test_short_episodes_are_begun_more_often_until_the_steps_are_shared_out() -> None:
+    """Three skills whose episodes last 20, 100 and 200 steps."""
+    sampling, length = focal(3, focal="none", focal_steps=True), T([20.0, 100.0, 200.0])
+    assert sampling.commanded.tolist() == pytest.approx([1 / 3] * 3)
+    for _ in range(2000):
+        steps = sampling.commanded * length
+        labels = torch.arange(3).repeat_interleave((4096 * steps / steps.sum()).round().long())
+        sampling.update(torch.full((len(labels),), 0.5), labels)
+    shares = sampling.commanded * length
+    assert (shares / shares.sum()).tolist() == pytest.approx([1 / 3] * 3, abs=0.01)
+    assert sampling.probability.tolist() == pytest.approx([1 / 3] * 3)  # clips are drawn as ever
+
+    again = focal(3, focal="none", focal_steps=True)
+    again.load_state_dict(sampling.state_dict())
+    assert torch.equal(again.commanded, sampling.commanded)
+
+
+def test_a_skill_of_which_no_step_is_left_is_not_begun_for_ever() -> None:
+    sampling = focal(2, focal_steps=True)
+    for _ in range(5000):
+        sampling.update(T([0.5]), T([0]))
+    assert sampling.commanded[1] < 0.999
+    assert sampling.commanded.isfinite().all()
+
+
+def test_without_it_new_episodes_have_the_shares_themselves() -> None:
+    sampling = focal(3, focal_rate=1.0)
+    sampling.update(T([0.1, 0.5, 0.9, 0.9]), T([0, 1, 2, 2]))
+    assert torch.equal(sampling.commanded, sampling.probability)

@@ -107,7 +107,8 @@ def test_a_clip_waits_for_who_is_behind_and_pays_less(character, library, genera
     assert waits < 0.5 + 3.5 * CONTROL_DT
     assert paid[-1] < 0.4
     late, _ = follower.step(at(library, KICK, waits + CONTROL_DT), generator)
-    assert late.item() == pytest.approx(1.0, abs=1e-3)  # that goes on, twenty steps late
+    assert late.item() > 0.95  # that goes on, twenty steps late; only its heading is not what it would be
+    assert follower.progress[0, [0, 2, 3]].tolist() == pytest.approx([1.0] * 3, abs=1e-3)
 
 
 def test_who_makes_a_clip_wait_for_too_long_has_lost_it(character, library, generator):
@@ -175,7 +176,8 @@ def test_critics_are_shown_what_following_pays_for_and_no_state_shows(character,
     assert near[:4].tolist() == pytest.approx([1.0] * 4, abs=1e-3)
     assert near[4].item() == pytest.approx(0.0, abs=1e-3)
     assert near[5:7].square().sum().item() == pytest.approx(1.0)
-    assert near[7:].tolist() == [0.0, 0.0]
+    assert near[7:9].tolist() == [0.0, 0.0]
+    assert near[9].item() == pytest.approx(0.0, abs=1e-3)
     for _ in range(8):
         reward, _ = follower.step(at(library, KICK, 0.5), generator)
     waits = follower.progress[0]
@@ -183,6 +185,55 @@ def test_critics_are_shown_what_following_pays_for_and_no_state_shows(character,
     assert (waits[:4] * torch.tensor([0.4, 0.2, 0.2, 0.2])).sum().item() * 0.3 == pytest.approx(reward.item())
     follower.turn(torch.tensor([0]), generator)
     assert follower.progress[0, 8].item() == pytest.approx(1.0)  # of patience
+
+
+@pytest.fixture(scope="module")
+def turning(character: Character) -> MotionLibrary:
+    return MotionLibrary(load_clips("builtin", character, ["turn_left_90"]), character)
+
+
+def turn(character: Character, turning: MotionLibrary, spin: float, generator: torch.Generator, **changes: Any):
+    """Rewards, losses and deviations of who does all that a turn does from 0.4 s on, at `spin` [rad/s] more."""
+    follower, _ = tracker(character, turning, [0], **changes)
+    follower.begin(torch.tensor([0]), torch.tensor([0]), torch.tensor([0.4], dtype=torch.float64))
+    told = []
+    for step in range(1, 37):
+        state = at(turning, 0, 0.4 + step * CONTROL_DT).clone()
+        state[:, state_parts(character).angular][:, 2] += spin
+        reward, lost = follower.step(state, generator)
+        told.append((reward.item(), lost.item(), follower.progress[0, -1].item()))
+    return [list(column) for column in zip(*told, strict=True)]
+
+
+def test_who_turns_more_or_less_than_the_clip_earns_less_and_less_and_has_lost_it(character, turning, generator):
+    exact, losses, deviation = turn(character, turning, 0.0, generator)
+    assert min(exact) > 0.99
+    assert not any(losses)
+    assert max(map(abs, deviation)) < 0.02
+    for spin in (-0.9, 0.9):
+        rewards, losses, deviation = turn(character, turning, spin, generator)
+        assert rewards[-1] < rewards[0] - 0.1
+        # of a constant error all but e^-t is remembered after t seconds
+        after = [spin * (1 - np.exp(-step * CONTROL_DT)) for step in range(1, 37)]
+        assert deviation == pytest.approx(after, abs=0.05)
+        assert losses == [abs(turned) > 0.6 for turned in deviation]
+        assert losses[-1]
+    assert not any(turn(character, turning, -0.9, generator, turned=1.0)[1])
+
+
+def test_a_deviation_of_the_heading_is_forgotten(character, turning, generator):
+    follower, _ = tracker(character, turning, [0], turned=9.0)
+    follower.begin(torch.tensor([0]), torch.tensor([0]), torch.tensor([0.4], dtype=torch.float64))
+    state = at(turning, 0, 0.4 + CONTROL_DT).clone()
+    state[:, state_parts(character).angular][:, 2] += 6.0
+    follower.step(state, generator)
+    first = follower.progress[0, -1].item()
+    assert first == pytest.approx(6.0 * CONTROL_DT, abs=0.02)
+    for step in range(2, 32):
+        follower.step(at(turning, 0, 0.4 + step * CONTROL_DT), generator)
+    assert follower.progress[0, -1].item() == pytest.approx(first / np.e, abs=0.02)
+    follower.turn(torch.tensor([0]), generator)
+    assert follower.progress[0, -1].item() == 0.0
 
 
 def test_what_a_clip_says_nothing_of_is_left_out(character, generator):
@@ -403,6 +454,7 @@ def test_following_goes_on_from_a_saved_state_bit_for_bit(generator):
     [
         ({"lost": -1.0}, "tracking.lost=-1.0: needs at least 0"),
         ({"patience": float("nan")}, "tracking.patience=nan"),
+        ({"turned": -0.1}, "tracking.turned=-0.1: needs at least 0"),
         ({"switch": 1.5}, "tracking.switch=1.5: needs a probability"),
     ],
 )
