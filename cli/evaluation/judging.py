@@ -129,6 +129,7 @@ def inception(evidence: Evidence) -> Outcome:
 
 
 def controllability(evidence: Evidence) -> Outcome:
+    """How much is seen as what was commanded, and as the curves "names" and "seen" what each command is seen as."""
     scene, held = evidence.scene, evidence.held
     p = scene.probabilities(held["window"])
     if scene.labelled:
@@ -136,15 +137,16 @@ def controllability(evidence: Evidence) -> Outcome:
         skills = len(scene.library.skills)
         label = torch.cat((scene.library.clip_skill[torch.tensor(scene.distinct)], torch.tensor([skills])))
         p = torch.zeros(len(p), skills + 1).index_add_(1, label, p)
+        names = list(scene.library.skills)
     else:
-        commanded = scene.number(held["clip"])
+        commanded, names = scene.number(held["clip"]), scene.names
     return Outcome(
         {
             "controllability": bootstrapped(
                 lambda rows: classifier.controllability(p[rows], commanded[rows]), len(p), scene.generator()
             )
         },
-        {},
+        {"names": names, "seen": classifier.confusion(p, commanded, len(names)).tolist()},
     )
 
 

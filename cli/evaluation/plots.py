@@ -77,6 +77,15 @@ def _frequencies(results: dict[str, Any], curves: dict[str, Any], history: list[
     return figure
 
 
+def _obeyed(results: dict[str, Any], curves: dict[str, Any], history: list[dict[str, str]]) -> Any:
+    found = curves.get("controllability", {}).get(TRAINED, {})
+    if not found.get("seen"):  # an evaluation of before there were any
+        return None
+    seen, names = 100 * np.array(found["seen"]), found["names"]
+    columns = [*names, "(none)"][: seen.shape[1]]
+    return _matrix(seen, names, "seen as", "commanded", "windows [%]", columns)
+
+
 def _transitions(results: dict[str, Any], curves: dict[str, Any], history: list[dict[str, str]]) -> Any:
     matrix = curves.get("transitions", {}).get(TRAINED, {}).get("transitions")
     return matrix and _matrix(np.array(matrix), results["clips"]["names"], "clip after", "clip before", "probability")
@@ -87,14 +96,17 @@ def _distances(results: dict[str, Any], curves: dict[str, Any], history: list[di
     return matrix and _matrix(np.array(matrix), results["clips"]["names"], "clip", "clip", "mean distance of latents")
 
 
-def _matrix(values: np.ndarray, names: list[str], across: str, down: str, meaning: str) -> Any:
+def _matrix(
+    values: np.ndarray, names: list[str], across: str, down: str, meaning: str, columns: list[str] | None = None
+) -> Any:
+    """A picture of values [n, m] with names of the rows, and of the columns too unless they have their own."""
     side = min(12.0, max(5.0, 0.15 * len(names) + 2.0))
     figure = _figure(side + 1.0, side)
     axes = figure.add_subplot()
     image = axes.imshow(values, cmap="viridis", vmin=0.0)
     figure.colorbar(image, ax=axes, label=meaning, shrink=0.7)
     axes.set(xlabel=across, ylabel=down)
-    _name(axes.set_xticks, names, rotation=90)
+    _name(axes.set_xticks, names if columns is None else columns, rotation=90)
     _name(axes.set_yticks, names)
     return figure
 
@@ -169,6 +181,7 @@ _Draw = Callable[[dict[str, Any], dict[str, Any], list[dict[str, str]]], Any]
 _PICTURES: dict[str, tuple[str, _Draw]] = {
     "coverage": ("Coverage against the filtering rate", _coverage),
     "frequencies": ("How often each clip is matched", _frequencies),
+    "obeyed": ("What each command is seen as", _obeyed),
     "transitions": ("Probability of the clip after a change of command, given the one before", _transitions),
     "paths": ("Root paths of the skills that vary most, seen from their start", _paths),
     "latents": ("Encodings of windows of the clips, a colour a clip", _maps),

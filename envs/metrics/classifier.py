@@ -149,6 +149,21 @@ def controllability(probability: Tensor, commanded: Tensor) -> float:
     return (probability.argmax(1) == commanded).double().mean().item()
 
 
+def confusion(probability: Tensor, commanded: Tensor, classes: int) -> Tensor:
+    """What the windows under each command are seen as: shares [classes, K], or [classes, K + 1], float64.
+
+    Its diagonal says which commands are obeyed. A row whose command no window has is 0.
+
+    Args:
+        probability: [n, K], or with what is no class, [n, K + 1].
+        commanded: [n] int64, as for `controllability`.
+        classes: how many commands there are.
+    """
+    seen = F.one_hot(probability.argmax(1), probability.shape[1]).double()
+    counts = seen.new_zeros(classes, probability.shape[1]).index_add_(0, commanded, seen)
+    return counts / counts.sum(1, keepdim=True).clamp_min(1.0)
+
+
 def held_out_split(length: int, frames: int, share: float, generator: torch.Generator) -> tuple[Tensor, Tensor]:
     """Which windows of a clip train and which are held out, so that none of the one shares a frame with the other.
 

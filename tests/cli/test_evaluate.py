@@ -13,6 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from murmillo.agents.common import checkpoint
@@ -285,6 +286,13 @@ def test_agents_that_are_told_what_to_do(
         assert seen["replayed"]["value"] > 0.7
         assert seen["trained"]["value"] < 0.2  # chance is 1 in 45
         assert found["inception"]["inception"]["values"]["replayed"]["value"] > 10.0
+        curves = json.loads((run / "evaluation" / "curves.json").read_text())["controllability"]
+        names, matrix = curves["replayed"]["names"], np.array(curves["replayed"]["seen"])
+        assert matrix.shape == (len(names), len(names) + 1)  # the last is a pose that is held
+        asked = matrix.sum(1) > 0
+        np.testing.assert_allclose(matrix[asked].sum(1), 1.0)
+        assert np.diag(matrix)[asked].mean() > 0.7
+        assert (run / "evaluation" / "plots" / "obeyed.png").is_file()
     else:
         values = found["concentration"]["concentration"]["values"]
         assert 0.0 < values["trained"]["value"] < 1.0

@@ -13,6 +13,7 @@ from murmillo.envs.errors import SuiteError
 from murmillo.envs.metrics.classifier import (
     Classifier,
     ClassifierConfig,
+    confusion,
     controllability,
     held_out_split,
     inception_score,
@@ -172,6 +173,14 @@ def test_clips_too_short_are_named() -> None:
         train_classifier([torch.zeros(30, 2), torch.zeros(4, 2)], torch.Generator(), config=QUICK)
     with pytest.raises(SuiteError, match="no clip has room to hold one out; ask for shorter windows"):
         train_classifier([torch.zeros(9, 2), torch.zeros(9, 2)], torch.Generator(), config=QUICK)
+
+
+def test_confusion_by_hand() -> None:
+    probability = torch.tensor([[0.7, 0.2, 0.1], [0.1, 0.2, 0.7], [0.3, 0.6, 0.1], [0.1, 0.8, 0.1]])
+    seen = confusion(probability, torch.tensor([0, 0, 0, 2]), 4)
+    third = 1 / 3
+    expected = [[third, third, third], [0, 0, 0], [0, 1, 0], [0, 0, 0]]
+    torch.testing.assert_close(seen, torch.tensor(expected, dtype=torch.float64))
 
 
 def test_controllability_by_hand() -> None:

@@ -18,7 +18,13 @@ from torch import Tensor
 from murmillo.envs import metrics
 from murmillo.envs.character import CONTROL_DT, Character, load_character
 from murmillo.envs.metrics.alignment import warping_path
-from murmillo.envs.metrics.classifier import ClassifierConfig, controllability, inception_score, train_classifier
+from murmillo.envs.metrics.classifier import (
+    ClassifierConfig,
+    confusion,
+    controllability,
+    inception_score,
+    train_classifier,
+)
 from murmillo.envs.metrics.coverage import coverage, filtered_coverage, frequencies, majority_clip, positions
 from murmillo.envs.metrics.diversity import average_pairwise_distance, most_diverse, repeated_distance, root_paths
 from murmillo.envs.metrics.frechet import frechet_distance
@@ -199,6 +205,7 @@ CASES = {
     "average_pairwise_distance": Case(lambda s: figures(average_pairwise_distance(s.state))),
     "class_distances": Case(lambda s: class_distances(s.latent, s.commanded), ("clip", "clip")),
     "classical_mds": Case(lambda s: classical_mds(torch.cdist(s.latent, s.latent)), ("trajectory",)),
+    "confusion": Case(lambda s: confusion(s.probability, s.commanded, CLIPS), ("clip", "clip")),
     "controllability": Case(lambda s: figures(controllability(s.probability, s.commanded))),
     "coverage": Case(lambda s: figures(coverage(s.parts[0], s.matcher.distinct))),
     "filtered_coverage": Case(lambda s: figures(filtered_coverage(s.parts[0], s.matcher.distinct, 0.9))),
