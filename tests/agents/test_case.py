@@ -112,6 +112,14 @@ def test_curriculum_and_focal_sampling_reach_the_environment(tmp_path: Path) -> 
     assert make_case(PointMass(3), torch.Generator(), focal="none").directions() == {}
 
 
+def test_where_steps_are_shared_out_new_episodes_are_commanded_so(generator: torch.Generator) -> None:
+    agent = make_case(PointMass(3, skills=SKILLS), generator, focal="none", focal_steps=True)
+    agent.focal.update(torch.full((4,), 0.5), torch.tensor([0, 0, 0, 1]))
+    weights = agent.directions()["skill_weights"]
+    assert torch.equal(weights, agent.focal.commanded)
+    assert weights[0] < weights[1]
+
+
 def test_demonstrations_are_drawn_by_the_shares_of_their_skills(generator: torch.Generator) -> None:
     agent = make_case(PointMass(3, skills=SKILLS), generator)
     agent.focal.probability = torch.tensor([0.0, 0.9, 0.1])

@@ -17,6 +17,7 @@ from murmillo.agents.common.exactness import WORDS
 from murmillo.agents.common.runner import Runner
 from murmillo.agents.common.skill_model import SightedCritic
 from murmillo.cli import gl
+from murmillo.envs.tracking import PROGRESS_SIZE
 from tests.cli.running import interrupted, rows
 
 Murmillo = Callable[..., tuple[int, str, str]]
@@ -105,7 +106,7 @@ def test_a_run_whose_critic_sees_progress_is_taken_up_again_and_played_where_nob
     assert status == 0, err
     status, _, err = murmillo("train", "run.resume=runs/follows", "runner.samples=128")
     assert status == 0, err
-    assert set(seen) == {9}
+    assert set(seen) == {PROGRESS_SIZE}
     assert [row["samples"] for row in rows(folder / "runs" / "follows")] == ["64", "128"]
     known = len(seen)
     status, _, err = murmillo("evaluate", "run=runs/follows", "worlds=4")
