@@ -29,7 +29,7 @@ lint: $(INSTALLED)  ## ruff and the import contracts
 type: $(INSTALLED)  ## pyright
 	$(BIN)/pyright
 
-bench: $(INSTALLED)  ## run the benchmarks, a quarter of an hour; ARGS="-k environments" some of them
+bench: $(INSTALLED)  ## run the benchmarks, six minutes; ARGS="-k environments" some of them
 	$(BENCH) $(ARGS)
 
 bench-compare: $(INSTALLED)  ## run what the gate needs, and fail where a ratio has fallen by more than 15 %
