@@ -86,6 +86,14 @@ def test_flies_freely(name: str) -> None:
     assert np.abs(middle[:, :2]).max() < 5.0
 
 
+@pytest.mark.parametrize("name", ["walk_forward", "run_forward"])
+def test_a_foot_never_flies_back(name: str) -> None:
+    """Not even where the body is slow, at the beginning and at the end."""
+    position, _ = CHARACTER.forward_kinematics(torch.from_numpy(CLIPS[name].qpos.copy()))
+    feet = position[:, CHARACTER.body_ids(CHARACTER.feet), 0].numpy()
+    assert (np.diff(feet, axis=0) * CLIPS[name].fps).min() > -0.4  # [m/s]
+
+
 @pytest.mark.parametrize("name", ["walk_left", "walk_right", "run_left", "run_right"])
 def test_feet_never_cross_sideways(name: str) -> None:
     position, _ = CHARACTER.forward_kinematics(torch.from_numpy(CLIPS[name].qpos.copy()))

@@ -1,5 +1,7 @@
 """Runs, ahead, back and aside, each from guard and back into it."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from murmillo.envs.motion.authored.gait import RUNNING, Carriage, Footfall, Swing, keys_between, steps_between
@@ -7,6 +9,10 @@ from murmillo.envs.motion.authored.skills.footwork import ahead
 from murmillo.envs.motion.authored.skills.guard_pose import GUARD, LEFT, RIGHT
 from murmillo.envs.motion.authored.skills.strides import CARRIED, SETTLING, home, settled, straight
 from murmillo.envs.motion.authored.take import Key, Take
+
+# The slower the body, the more the thigh leads and the less the knee folds, or the foot would first fly back.
+SLOWEST = replace(RUNNING, legs=((0.25, 12.0, 74.0, 25.0), (0.50, 30.0, 80.0, 22.0), (0.75, 39.0, 60.0, 12.0)))
+SLOWER = replace(RUNNING, legs=((0.25, 2.0, 78.0, 62.0), (0.50, 24.0, 88.0, 50.0), (0.75, 41.0, 68.0, 22.0)))
 
 
 def run_forward() -> Take:
@@ -25,12 +31,13 @@ def run_forward() -> Take:
     beats = [0.0, 12.0, 11.0, *[10.0] * 5, 9.0, 9.0, 9.0, 10.0, 11.0, 12.0]
     lengths = [0.46, 0.67, 0.88, 1.02, 1.01, 0.97, 0.93, 0.88, 0.78, 0.66, 0.55, 0.44, 0.34, 0.26]
     flights = [-2.0, 1.0, 3.0, *[4.0] * 5, 3.0, 2.0, 1.0, -1.0, -2.0, -3.0]
+    leaving = Swing(lift=0.08, push=40.0, push_time=0.18, strike=4.0)
     braked = Swing(lift=0.06, push=30.0, push_time=0.16, strike=10.0, flat_time=0.08)
     falls = straight(
         lengths,
         first=0.9,
         beat=np.array(beats) / 30.0,
-        swing=[Swing(lift=0.08, push=40.0, push_time=0.18, strike=4.0), *[RUNNING] * 9, *[braked] * 4],
+        swing=[leaving, SLOWEST, SLOWER, *[RUNNING] * 6, SLOWER, *[braked] * 4],
         flight=np.array(flights) / 30.0,
         width=0.05,
         toe_out=4.0,
