@@ -14,10 +14,13 @@ def check_choice(name: str, value: Any, choices: Sequence[str]) -> None:
         raise SuiteError(f"task.{name}={value}: no such choice; there are: {', '.join(choices)}")
 
 
-def check_number(name: str, value: Any, *, least: float = -math.inf, above: float = -math.inf) -> None:
-    """Refuse what is not a finite number of at least `least` and greater than `above`."""
-    if not _is_number(value) or value < least or value <= above:
+def check_number(
+    name: str, value: Any, *, least: float = -math.inf, above: float = -math.inf, most: float = math.inf
+) -> None:
+    """Refuse what is not a finite number of at least `least`, greater than `above` and no greater than `most`."""
+    if not _is_number(value) or value < least or value <= above or value > most:
         bound = f" above {above:g}" if above > -math.inf else f" of at least {least:g}" if least > -math.inf else ""
+        bound += f" up to {most:g}" if most < math.inf else ""
         raise SuiteError(f"task.{name}={value}: needs a number{bound}")
 
 

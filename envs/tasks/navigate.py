@@ -11,8 +11,9 @@ from torch import Tensor
 from murmillo.envs.character import CONTROL_DT
 from murmillo.envs.markers import Marker
 from murmillo.envs.physics import State
+from murmillo.envs.rotations import heading
 from murmillo.envs.tasks.arguments import check_choice, check_number, check_range, check_steps
-from murmillo.envs.tasks.goals import BLUE, TARGET_DOCS, GoalTask, directions, into_heading, towards_target
+from murmillo.envs.tasks.goals import BLUE, TARGET_DOCS, GoalTask, into_heading, towards_target, uniform, unit
 from murmillo.envs.tasks.interface import Task
 
 _SEEN_DISTANCE = 3.0
@@ -50,6 +51,7 @@ class NavigateConfig:
         wanted: least and greatest speed that is rewarded on the way [m/s]; (1.2, 1.5) or (2, 4).
         radius: nearer to the target the reward is full [m].
         detour: an episode ends where the target is farther by this than it was when drawn [m].
+        turn: a target is drawn to the left or right of the heading by this at most [deg]; 180 is all around.
     """
 
     gait: Literal["walk", "run"] = "walk"
@@ -60,6 +62,7 @@ class NavigateConfig:
     wanted: tuple[float, float] | None = None
     radius: float = 0.5
     detour: float = 3.0
+    turn: float = 180.0
 
 
 class Navigate(GoalTask):
@@ -117,10 +120,13 @@ class Navigate(GoalTask):
         check_range("wanted", self.wanted, least=0.01)
         check_number("radius", config.radius, least=0.0)
         check_number("detour", config.detour, above=0.0)
+        check_number("turn", config.turn, above=0.0, most=180.0)
 
     def draw(self, env_ids: Tensor, state: State, generator: torch.Generator) -> dict[str, Tensor]:
         n = len(env_ids)
-        return {"velocity_w": self._speeds(n, generator).unsqueeze(-1) * directions(n, generator)}
+        reach = math.radians(self.config.turn)
+        angle = heading(state.qpos[env_ids, 3:7]) + uniform(n, (-reach, reach), generator)
+        return {"velocity_w": self._speeds(n, generator).unsqueeze(-1) * unit(angle)}
 
     def reset(self, env_ids: Tensor, state: State, generator: torch.Generator) -> None:
         super().reset(env_ids, state, generator)

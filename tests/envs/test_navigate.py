@@ -153,6 +153,18 @@ def test_targets_lie_as_far_as_their_time_lets_one_come(gait, steps, speeds, mea
     assert torch.nn.functional.normalize(way, dim=-1).mean(0).abs().max() < 0.06
 
 
+def test_targets_lie_to_either_side_of_the_heading_as_far_as_turn_says() -> None:
+    env = make(2048, task={"turn": 60.0})
+    task = navigate(env)
+    place(env, (1.0, 2.0), yaw=2.5)
+    task.reset(torch.arange(env.num_envs), env.state, torch.Generator().manual_seed(0))
+    way = task.goals["target_w"] - torch.tensor([1.0, 2.0], dtype=torch.float64)
+    angle = torch.rad2deg(torch.atan2(way[:, 1], way[:, 0]) - 2.5 + torch.pi).remainder(360.0) - 180.0
+    assert angle.abs().max() <= 60.0 + 1e-6
+    assert angle.std().item() == pytest.approx(120.0 / 12**0.5, rel=0.05)  # an even spread
+    assert angle.mean().abs() < 3.0
+
+
 def test_a_commanded_target_holds_and_asks_for_the_mean_speed() -> None:
     env = make()
     task = navigate(env)
@@ -192,6 +204,8 @@ def test_a_fall_needs_a_low_body_that_is_touched_itself() -> None:
         ({"wanted": (0.0, 1.0)}, "task.wanted"),
         ({"hold_steps": (0, 3)}, "task.hold_steps"),
         ({"detour": -1.0}, "task.detour=-1.0"),
+        ({"turn": 0.0}, "task.turn=0.0: needs a number above 0 up to 180"),
+        ({"turn": 270}, "task.turn=270: needs a number above 0 up to 180"),
     ],
 )
 def test_arguments_that_cannot_be_are_named(task, message) -> None:
