@@ -104,8 +104,9 @@ def compose_adaptnet(words: list[str]) -> AdaptNetTrainConfig:
     base = _find_base(words)
     # who names other motions means all of them, not those clips that are called like the former ones
     everything = [] if value_of(words, "motions") is None else ["clips=[]"]
-    begun = [] if base is None else [*base.sizes(), "warm_start.steps=0"]
-    return _compose(base, [*everything, *begun, *words])
+    # what a budget says of bases, an adaptation has of its own
+    kept = [] if base is None else [*base.sizes(), f"task.turn={base.config.task.turn}", "warm_start.steps=0"]
+    return _compose(base, [*everything, *kept, *words])
 
 
 def load(folder: Path, words: list[str] | None = None) -> AdaptNetTrainConfig:

@@ -59,7 +59,7 @@ SIZES = ("agent.recurrent=8", "agent.ppo.hidden=[80,72]", "warm_start.steps=2", 
 def trained(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a tiny base, `base`, and adaptations of it, `style` and `slippery`; only to be read."""
     root, threads = tmp_path_factory.mktemp("adaptnet"), torch.get_num_threads()
-    assert main(["train", "agent=adaptnet", *TINY, *SIZES, f"run.root={root}", "run.name=base"]) == 0
+    assert main(["train", "agent=adaptnet", *TINY, *SIZES, "task.turn=75", f"run.root={root}", "run.name=base"]) == 0
     adapt = ("train", "agent=adaptnet", "stage=adapt", f"base={root}/base", *TINY, f"run.root={root}")
     assert main([*adapt, "to=style", "run.name=style"]) == 0
     assert main([*adapt, "to=friction", "agent.ppo.policy_learning_rate=1e-2", "run.name=slippery"]) == 0
@@ -89,6 +89,7 @@ def test_every_budget_composes(budget: str) -> None:
     assert (runner.gamma, runner.lam, runner.horizon, runner.termination_reward) == (0.95, 0.95, 8, -25.0)
     assert runner.reward_weights == {"task": 0.5, "imitation": 0.5}
     assert (config.num_envs, config.env.clips) == (512, ("run",))
+    assert config.task.turn == (180.0 if budget == "paper" else 60.0)
     if budget == "paper":
         assert config.agent == AdaptNetConfig()
         assert runner.samples == 100_000 * 512 * 8
@@ -103,7 +104,7 @@ def test_every_file_of_the_groups_is_reached(trained: Path) -> None:
         assert config.choices == {"agent": "adaptnet", "stage": "adapt", "budget": "laptop", **chosen}
         # what is the base's stays the base's
         assert (config.agent.recurrent, config.agent.ppo.hidden) == (8, (80, 72))
-        assert config.warm_start.steps == 0
+        assert (config.warm_start.steps, config.task.turn) == (0, 75.0)
     assert set(names["to"]) == set(TARGETS)
     assert set(names["ablation"]) >= {"injection_z1", "injection_z2", "injection_all", "internal_only", "lora"}
 
