@@ -104,7 +104,7 @@ def compose_adaptnet(words: list[str]) -> AdaptNetTrainConfig:
     base = _find_base(words)
     # who names other motions means all of them, not those clips that are called like the former ones
     everything = [] if value_of(words, "motions") is None else ["clips=[]"]
-    # what a budget says of bases, an adaptation has of its own
+    # these settings of a budget are for bases; an adaptation has those of its own base
     kept = [] if base is None else [*base.sizes(), f"task.turn={base.config.task.turn}", "warm_start.steps=0"]
     return _compose(base, [*everything, *kept, *words])
 
