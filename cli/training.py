@@ -37,6 +37,7 @@ from murmillo.cli.evaluation.kept import Keeper
 from murmillo.cli.evaluation.table import QUICK
 from murmillo.cli.metrics import TRAINING, Metric
 from murmillo.cli.progress import Progress, make_progress
+from murmillo.cli.skill_log import SkillLogger
 from murmillo.envs import HumanoidVectorEnv
 from murmillo.envs.devices import on
 from murmillo.envs.motion.licences import terms_of
@@ -123,7 +124,7 @@ def _train(config: TrainConfig, env: HumanoidVectorEnv, folder: Path, resuming: 
         generator,
         folder / runs.LAST,
         meta=checkpoint_meta(kind, config.agent, env, adapted=base is not None),
-        logger=Logger(folder) if ranks.first else None,
+        logger=_logger(agent, env, folder) if ranks.first else None,
         ranks=ranks,
     )
     if resuming:
@@ -193,6 +194,11 @@ def follow(
     if runner.logger is not None:
         runner.logger.close()
     return runner.ranks.any(stopped())
+
+
+def _logger(agent: Any, env: HumanoidVectorEnv, folder: Path) -> Logger:
+    """Of an agent with labels, one that follows each skill."""
+    return SkillLogger(folder, agent, env.skills) if isinstance(agent, Labelled) else Logger(folder)
 
 
 def _keep_skills(agent: Any, env: HumanoidVectorEnv, folder: Path) -> None:

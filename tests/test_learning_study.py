@@ -73,11 +73,11 @@ def test_a_study_is_run_kept_and_taken_up_again(study: ModuleType, monkeypatch: 
     asked: list[list[str]] = []
     threads = torch.get_num_threads()
 
-    def train(words: list[str]) -> int:
-        asked.append(words)
-        return main(["train", *words])
+    def murmillo(words: list[str]) -> int:
+        asked.append(words[1:])
+        return main(words)
 
-    monkeypatch.setattr(study, "train", train)
+    monkeypatch.setattr(study, "murmillo", murmillo)
     study.main(["tiny"])
     assert [word for word in asked[0] if word.startswith(("clips", "runner.gamma", "runner.samples", "run.name"))] == [
         "clips=[walk_forward]", "runner.samples=128", "runner.gamma=0.9", "run.name=gamma_0.9-1",
@@ -115,14 +115,48 @@ def test_a_study_of_adaptnet_keeps_what_that_is_rewarded_for(
     study: ModuleType, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     threads = torch.get_num_threads()
-    monkeypatch.setattr(study, "train", lambda words: main(["train", *words]))
+    monkeypatch.setattr(study, "murmillo", main)
     small = ["agent.recurrent=8", "agent.ppo.epochs=1", "agent.discriminator.recurrent=8", "env.episode_steps=80"]
     write(STUDY | {"task": "adaptnet", "words": [*TINY, *small], "variants": {"base": []}})
     study.main(["tiny"])
     run = json.loads(Path("docs", "tiny.json").read_text())["variants"]["base"]["seeds"]["1"]
-    assert list(run) == ["samples", "seconds", "episode/length", "reward/task", "reward/imitation", "measured"]
+    assert list(run) == [
+        "samples",
+        "seconds",
+        "episode/length",
+        "episode/fall_rate",
+        "reward/task",
+        "reward/imitation",
+        "measured",
+    ]
     assert -1 <= run["reward/imitation"][-1] <= 1
     assert run["measured"]["length"] > 0
+    torch.set_num_threads(threads)
+
+
+def test_skills_and_what_is_measured_on_the_way(study: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[list[str]] = []
+    threads = torch.get_num_threads()
+
+    def murmillo(words: list[str]) -> int:
+        asked.append(words)
+        return main(words)
+
+    monkeypatch.setattr(study, "murmillo", murmillo)
+    monkeypatch.setattr(study, "TRAJECTORIES", 4)
+    words = ["agent=case", "ablation=neither", *TINY]
+    write(STUDY | {"task": "ten", "words": words, "variants": {"short": []}, "measured_every": 64})
+    study.main(["tiny"])
+    run = json.loads(Path("docs", "tiny.json").read_text())["variants"]["short"]["seeds"]["1"]
+    assert {"guard", "run_forward"} < run["skills"].keys()
+    assert all(0 < score < 1 for scores in run["skills"].values() for score in scores)
+    assert run["along"]["samples"] == [64, 128]
+    assert all(0 <= share <= 1 for name in ("coverage_10", "controllability") for share in run["along"][name])
+    assert len(run["along"]["coverage_10"]) == 2
+    assert Path("docs", "tiny_skills_short.png").stat().st_size > 1000
+
+    study.main(["tiny"])  # nothing is trained or measured again
+    assert [words[0] for words in asked] == ["train", "evaluate"]
     torch.set_num_threads(threads)
 
 
@@ -147,7 +181,7 @@ def test_what_is_no_study_is_refused_in_one_line(study: ModuleType, content: obj
 
 
 def test_words_that_training_refuses(study: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(study, "train", lambda words: main(["train", *words]))
+    monkeypatch.setattr(study, "murmillo", main)
     write(STUDY | {"words": ["num_env=8"]})
     with pytest.raises(SystemExit, match="no run has made an iteration"):
         study.main(["tiny"])

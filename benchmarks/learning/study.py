@@ -3,8 +3,9 @@
     python benchmarks/learning/study.py discount             # docs/learning/discount.json and discount.png
     python benchmarks/learning/study.py discount --seeds 1   # one seed first
 
-Its runs lie in runs/learning/discount/. A study is a file of `studies/`; its task is a line of `tasks.yaml`. Stop it at
-any time: the same command goes on.
+Its runs lie in runs/learning/discount/. A study is a file of `studies/`; its task is a line of `tasks.yaml`; with
+`measured_every` a checkpoint is kept every so many samples, and what each covers and obeys is measured in the end. Stop
+it at any time: the same command goes on.
 """
 
 import argparse
@@ -19,12 +20,15 @@ from pathlib import Path
 import yaml
 from results import collect, plot
 
-from murmillo.cli.runs import LAST, MEASURES, SCALARS
+from murmillo.cli.runs import LAST, MEASURES, METRICS, SCALARS
 
 HERE = Path(__file__).parent
 RUNS = Path("runs/learning")
 RESULTS = HERE.parents[1] / "docs" / "learning"
 ADAPTNET = "agent=adaptnet"
+ALONG = ("metrics=[coverage,controllability]", "checkpoint=all", "start=reference", "worlds=0")
+"""What is measured of the checkpoints that a run kept on its way."""
+TRAJECTORIES = 200
 
 
 @dataclass(frozen=True)
@@ -36,6 +40,7 @@ class Study:
         seeds: of each variant.
         words: for `murmillo train`, of all runs; the task's and the number of samples among them.
         variants: further words of each variant by its name.
+        measured_every: samples between the checkpoints that are kept and measured, or None.
     """
 
     name: str
@@ -43,6 +48,7 @@ class Study:
     seeds: tuple[int, ...]
     words: tuple[str, ...]
     variants: dict[str, tuple[str, ...]]
+    measured_every: int | None = None
 
     def words_of(self, variant: str, seed: int) -> list[str]:
         """The words of one run, but for where it is kept."""
@@ -79,7 +85,8 @@ def read(name: str) -> Study:
         *content.get("words", ()),
     )
     variants = {str(variant): tuple(words) for variant, words in content["variants"].items()}
-    return Study(name, content["question"], tuple(content.get("seeds", (1, 2, 3))), common, variants)
+    seeds = tuple(content.get("seeds", (1, 2, 3)))
+    return Study(name, content["question"], seeds, common, variants, content.get("measured_every"))
 
 
 def run(study: Study, variant: str, seed: int) -> bool:
@@ -91,7 +98,7 @@ def run(study: Study, variant: str, seed: int) -> bool:
     if folder.exists() and (not asked.exists() or json.loads(asked.read_text(encoding="utf-8")) != words):
         sys.exit(f"{folder}: was made with other settings; move it away, or give the variant another name")
     if (folder / MEASURES).exists():
-        return True
+        return _measured(study, folder)
     folder.parent.mkdir(parents=True, exist_ok=True)
     if (folder / LAST).exists():
         words = [f"run.resume={folder}"]
@@ -100,17 +107,26 @@ def run(study: Study, variant: str, seed: int) -> bool:
         asked.write_text(json.dumps(words), encoding="utf-8")
         words += [f"run.root={folder.parent}", f"run.name={name}", "run.video=false"]
         words += [] if ADAPTNET in words else ["run.evaluate=false"]  # its runs know no such setting
+        words += [] if study.measured_every is None else [f"run.keep_every={study.measured_every}"]
     print(f"{study.name}: {name}", flush=True)
-    return train(words) == 0 and (folder / MEASURES).exists()
+    ended = murmillo(["train", *words]) == 0 and (folder / MEASURES).exists()
+    return ended and _measured(study, folder)
 
 
-def train(words: list[str]) -> int:
-    """The exit status of `murmillo train` with these words; Ctrl-C reaches it too, and it is let save what it has."""
-    with subprocess.Popen([sys.executable, "-m", "murmillo.cli.main", "train", *words]) as training:
+def _measured(study: Study, folder: Path) -> bool:
+    """Measure what the study asks of the checkpoints that the run kept, unless it is done; whether it is."""
+    if study.measured_every is None or (folder / METRICS).exists():
+        return True
+    return murmillo(["evaluate", f"run={folder}", *ALONG, f"trajectories={TRAJECTORIES}"]) == 0
+
+
+def murmillo(words: list[str]) -> int:
+    """The exit status of `murmillo` with these words; Ctrl-C reaches it too, and it is let save what it has."""
+    with subprocess.Popen([sys.executable, "-m", "murmillo.cli.main", *words]) as command:
         try:
-            return training.wait()
+            return command.wait()
         except KeyboardInterrupt:
-            training.wait()
+            command.wait()
             raise
 
 
@@ -131,7 +147,7 @@ def main(words: list[str] | None = None) -> None:
     RESULTS.mkdir(parents=True, exist_ok=True)
     file = RESULTS / f"{study.name}.json"
     file.write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
-    print(f"{file}, {plot(results, file.with_suffix('.png'))}")
+    print(", ".join(map(str, [file, *plot(results, file.with_suffix(".png"))])))
     if not all(ended):
         sys.exit("some runs have not ended; the same command goes on with them")
 
