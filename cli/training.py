@@ -136,7 +136,8 @@ def _train(config: TrainConfig, env: HumanoidVectorEnv, folder: Path, resuming: 
         runs.write_json(folder / runs.TERMS, terms)
         runs.write_json(folder / runs.CLIPS, clip_digests(env.library.clips))
     what = kind if base is None else f"{kind} of {config.base}, adapted to {config.choices['to']},"
-    opening = f"{folder}: {what} on {len(env.library.clips)} clips, {launch.worlds(config, ranks)}"
+    count = len(env.library.clips)
+    opening = f"{folder}: {what} on {count} clip{'s' * (count > 1)}, {launch.worlds(config, ranks)}"
     keep = () if config.run.keep_every is None else (Keeper(runner, agent, config.run.keep_every, folder),)
 
     def begin(progress: Progress) -> None:

@@ -11,9 +11,13 @@ import pytest
 import torch
 import yaml
 
+from murmillo.cli.adaptation.config import compose_adaptnet
+from murmillo.cli.config import compose_train
 from murmillo.cli.main import main
 
 HERE = Path(__file__).parents[1] / "benchmarks" / "learning"
+ABOUT_A_BASE = ("stage", "base", "to", "method", "ablation")
+"""What an adaptation is told beside its base, which a test has not."""
 TINY = [
     "num_envs=8",
     "runner.horizon=8",
@@ -64,6 +68,12 @@ def test_every_study_can_be_read(study: ModuleType, monkeypatch: pytest.MonkeyPa
     for file in (HERE / "studies").glob("*.yaml"):
         read = study.read(file.stem)
         assert read.variants
+        for variant in read.variants:
+            words = read.words_of(variant, 1)
+            if study.ADAPTNET in words:
+                compose_adaptnet([word for word in words if word.partition("=")[0] not in ABOUT_A_BASE])
+            else:
+                compose_train(words)  # either refuses what is no setting
         assert f"runner.samples={yaml.safe_load(file.read_text())['samples']}" in read.words
     assert "study.py discount" in (study.__doc__ or "")
     assert study.read("discount").words_of("gamma_97", 2)[-2:] == ["runner.gamma=0.97", "seed=2"]
